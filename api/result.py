@@ -88,8 +88,8 @@ class Run(Results):
 
     def figures(self) -> dict[str, Figure]:
         """Matplotlib figures by name, as far as the scene has the signals: `mechanism`, or
-        `trajectories` without a linkage, `distance`, `forces`, `contact`, `constraints`,
-        `user_port`, `real_time`."""
+        `trajectories` without a linkage in the plane, `distance`, `forces`, `contact`,
+        `constraints`, `user_port`, `real_time`."""
         from hapticlink.visualization.figures import run_figures  # with casadi, slow to load
 
         return run_figures.figures(self)

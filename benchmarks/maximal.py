@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Place, in_plane
 
 End = tuple[int, tuple[float, float]]
 """A body, -1 for the ground, and a point on it from its centre of mass (m), of the ground from the
@@ -100,17 +101,17 @@ class Bodies:
         self.tip = self.end(op.body, op.at)
         self.weight = mass * (*(linkage.gravity or (0.0, 0.0)), 0.0)
 
-    def end(self, body: str, at: tuple[float, float] | None) -> End:
+    def end(self, body: str, at: Place | None) -> End:
         """A point of a body, given in its frame."""
-        point = np.array(at or (0.0, 0.0)) - self._center.get(body, np.zeros(2))
+        point = np.array(in_plane(at)) - self._center.get(body, np.zeros(2))
         return self._place.get(body, -1), (float(point[0]), float(point[1]))
 
     def start(self, q: np.ndarray, qd: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """z and zd at joint coordinates q (rad) and rates qd (rad/s)."""
         frames = {"ground": (np.zeros(2), 0.0, np.zeros(2), 0.0)}
 
-        def moved(frame: tuple, at: tuple[float, float] | None) -> tuple[np.ndarray, np.ndarray]:
-            r = turned(frame[1], np.array(at or (0.0, 0.0)))
+        def moved(frame: tuple, at: Place | None) -> tuple[np.ndarray, np.ndarray]:
+            r = turned(frame[1], np.array(in_plane(at)))
             return frame[0] + r, frame[2] + frame[3] * np.array([-r[1], r[0]])
 
         waiting = list(zip(self.linkage.joint, q, qd, strict=True))
@@ -120,7 +121,7 @@ class Bodies:
             parent = frames[joint.parent]
             pivot, drift = moved(parent, joint.at_parent)
             angle, omega = parent[1] + value, parent[3] + rate
-            x, y = joint.at_child or (0.0, 0.0)
+            x, y = in_plane(joint.at_child)
             origin, velocity = moved((pivot, angle, drift, omega), (-x, -y))
             frames[joint.child] = (origin, angle, velocity, omega)
         z, zd = [], []

@@ -25,6 +25,7 @@ from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
 from hapticlink.components.dynamics import closed_loop_solver, projection
 from hapticlink.components.specs.linkage import Linkage, Mechanism
+from hapticlink.components.specs.quantities import in_plane
 from studies import draw
 
 N, END, TURN = 2, 10.0, math.radians(30)
@@ -73,14 +74,14 @@ def linkage() -> Linkage:
     """The benchmark's, turned as a whole, gravity too."""
     straight = mechanisms.n_four_bar(N)
     joints = tuple(
-        replace(j, at_parent=turned(j.at_parent or (0.0, 0.0))) if j.parent == "ground" else j
+        replace(j, at_parent=turned(in_plane(j.at_parent))) if j.parent == "ground" else j
         for j in straight.joint
     )
     start = {
         name: float(angle) + TURN * name.startswith("pivot")  # type: ignore[arg-type]
         for name, angle in straight.start.items()
     }
-    gravity = turned(straight.gravity or (0.0, 0.0))
+    gravity = turned(in_plane(straight.gravity))
     return replace(straight, joint=joints, start=start, gravity=gravity)
 
 

@@ -117,9 +117,7 @@ def _starts(scene: Any, start: dict[str, float]) -> None:
 
 def _pose(start: dict[str, float]) -> list[float]:
     """Of the operational point at the start."""
-    from hapticlink.components.port_space import PLANE
-
-    return [start.get(f"x[{i}]", 0.0) for i in range(1, 1 + PLANE.size)]
+    return [value for name, value in start.items() if name.startswith("x[")]
 
 
 def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> None:
@@ -130,7 +128,8 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
     from hapticlink.visualization.mechanism import drawing, workspace_drawing
 
     figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
-    if q := coordinates(start):
+    q = coordinates(start)
+    if q and scene.linkage.dimension == 2:
         figures["start"] = drawing.figure(scene, q)
     if device := described_devices(scene).get(""):
         title = f"Device and its workspace: {scene.title}"

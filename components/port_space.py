@@ -99,6 +99,11 @@ class PortSpace:
         """The size of what is about axes in rows (..., n): an angle (rad), a moment (N.m)."""
         return self._size(entries, turns=True)
 
+    def moment(self, entries: Vector) -> Vector:
+        """What is about the one axis of a port in rows (..., n), with its sign; 0 without one."""
+        about = [i for i, turns in enumerate(self.turns) if turns]
+        return entries[..., about[0]] if about else np.zeros(entries.shape[:-1])
+
     def _size(self, entries: Vector, *, turns: bool) -> Vector:
         parts = (entries[..., i] for i, turn in enumerate(self.turns) if turn == turns)
         return reduce(np.hypot, parts, np.zeros(entries.shape[:-1]))
@@ -107,3 +112,5 @@ class PortSpace:
 LINE = PortSpace(("x",), (0,))
 PLANE = PortSpace(("x", "y", "theta"), (0, 1, 5))
 """Planar pose (x m, y m, theta rad) and wrench (N, N, N.m)."""
+POINT = PortSpace(("x", "y", "z"), (0, 1, 2))
+"""A point in space (x m, y m, z m) and the force on it (N, N, N)."""

@@ -120,7 +120,7 @@ def sample(kind: HoldRow, tick: int) -> Vector:
 
 def scalars() -> Figure:
     """A panel for each hold."""
-    names = [name for name in HOLDS if name not in ("latest", "mid")]  # which needs both ends
+    names = [name for name in HOLDS if name not in ("latest", "mid", "reaction")]  # both ends
     rows = -(-len(names) // 3)
     figure = Figure(figsize=(9, 1.75 * rows), layout="constrained")
     panels = figure.subplots(rows, 3, sharex=True)

@@ -96,7 +96,7 @@ def evaluated(linkage, expressions, *sizes):
     """(q, qd, *more, of=linkage) -> the values of `expressions(model, *symbols)`, of the symbolic
     model of a linkage and further symbols of these sizes; `of` is a linkage of the same structure
     whose parameters are taken."""
-    p, n = Signals("p", parameters(linkage)), sum({"free": 3}.get(j.type, 1) for j in linkage.joint)
+    p, n = Signals("p", parameters(linkage)), len(linkage.coordinate_units)
     q, qd, more = ca.SX.sym("q", n), ca.SX.sym("qd", n), [ca.SX.sym("u", *s) for s in sizes]
     found = expressions(LinkageModel(linkage, p, q, qd), *more)
     f = ca.Function("f", [q, qd, *more, p.vector], list(found))

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7044,
-    "fmus": 2989,
-    "orchestrator": 16084,
+    "components": 7455,
+    "fmus": 2991,
+    "orchestrator": 16205,
     "programs": 1023,
-    "analysis": 8827,
-    "visualization": 3508,
+    "analysis": 8879,
+    "visualization": 3601,
     "api": 635,
-    "commands": 1605,
+    "commands": 1606,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

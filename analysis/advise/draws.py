@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    FingertipHand,
+    ProfileHand,
+    SpringHand,
+)
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.scene import Scene
@@ -57,4 +63,8 @@ def _hand(scene: Scene, generator: np.random.Generator) -> dict[str, Any]:
                 if key in found:
                     factor = float(FACTOR ** generator.uniform(-1, 1))
                     found[key] = [factor * float(value) for value in found[key]]
+        case FingertipHand():
+            for key, value in found.items():
+                if isinstance(value, float):
+                    found[key] = float(FACTOR ** generator.uniform(-1, 1)) * value
     return found

@@ -17,6 +17,7 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
     DRIFT_WRENCH,
@@ -25,7 +26,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
-from hapticlink.orchestrator.results.recorded_scene import described_devices
+from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 
 WRENCHES = {
     HAND_WRENCH: "hand, F_hand",
@@ -37,14 +38,16 @@ WRENCHES = {
 
 
 def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
-    """Name, times (s), force (N) and moment (N.m) of each wrench that a run has; names of further
-    users' wrenches have their point first."""
+    """Name, times (s), force (N) and moment (N.m), 0 in space, of each wrench that a run has; names
+    of further users' wrenches have their point first."""
+    linkage = scene_part(results, "linkage", Linkage)
+    space = linkage.space if linkage else PLANE
     for user in find_users(results):
         signals = user.hand, user.drift, user.topology, user.environment
         for signal, name in zip(signals, WRENCHES.values(), strict=True):
             if (table := of_port(results, signal)) and len(table["time"]):
                 force, moment = table.by_row(
-                    lambda F: np.stack([PLANE.distance(F), F[:, 2]]), signal
+                    lambda F: np.stack([space.distance(F), space.moment(F)]), signal
                 )
                 yield f"{user.name}: {name}" if user.name else name, table["time"], force, moment
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach
-from hapticlink.components.linkage.closures import rows
+from hapticlink.components.linkage.model import count_rows
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT
 from hapticlink.orchestrator.scene.blocks import from_graphics, impedance, topology
 from hapticlink.orchestrator.scene.scene import Scene
@@ -25,7 +25,7 @@ def needs(scene: Scene) -> Iterator[Need]:
     """Every optional part of the equations, for a scene with a linkage."""
     if scene.linkage is None:
         return
-    count = sum(rows(scene.linkage))
+    count = count_rows(scene.linkage)
     yield Need(
         "loop closures",
         count > 0,

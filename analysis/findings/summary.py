@@ -173,13 +173,20 @@ def _energy(port: PortEnergy, every: int) -> str:
     hands."""
     seen = f", in one row of {every}" if every > 1 else ""
     hands = [1e3 * work for name, work in port.works.items() if name.endswith("hand")]
-    put_in = f"the hand {describe_work(sum(hands))}, " if hands else ""
+    whose = name_hands(port)
+    put_in = f"{whose} {describe_work(sum(hands))}, " if hands else ""
     this_is = "over" if port.peak > tolerated_energy(port.hand_work) else "within"
     generated = describe_generated(port.peak, port.generated, f", at {port.time_of_peak:.3g} s")
     return (
         f"energy at the user's port{seen}: {put_in}the rendering {generated}. A passive one "
-        f"generates none; this is {this_is} the tolerated {allowance(port.hand_work)}"
+        f"generates none; this is {this_is} the tolerated {allowance(port.hand_work, whose)}"
     )
+
+
+def name_hands(port: PortEnergy) -> str:
+    """Who puts energy in at the user's port: all hands that have a device, or act beside them."""
+    several = sum(name.endswith("hand") for name in port.works) > 1
+    return "the hands together" if several else "the hand"
 
 
 def describe_work(millijoules: float, took: str = "took") -> str:

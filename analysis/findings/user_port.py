@@ -101,12 +101,12 @@ def tolerated_energy(hand_work: float) -> float:
     return max(NOTICEABLE_J, SHARE * hand_work)
 
 
-def allowance(hand_work: float) -> str:
-    """What is `allowed`, in words."""
+def allowance(hand_work: float, whose: str = "the hand") -> str:
+    """What is `allowed`, in words, for `whose` work."""
     most = f"{short(1e3 * tolerated_energy(hand_work))} mJ"
     if SHARE * hand_work < NOTICEABLE_J:
         return f"{most}, the least that a hand notices"
-    return f"{most}, a quarter of the {short(1e3 * hand_work)} mJ that the hand gave and took back"
+    return f"{most}, a quarter of the {short(1e3 * hand_work)} mJ that {whose} gave and took back"
 
 
 def hand_work(results: Results) -> float:

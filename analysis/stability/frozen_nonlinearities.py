@@ -100,6 +100,8 @@ def describe_switches(system: System) -> list[str]:
     for c in system.connections:
         if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not has_friction(c):
             lines.append(f"{c.name}: the regime of hold {c.hold}")
+        if c.needs == "reaction":
+            lines.append(f"{c.name}: the hand's stiffness that hold {c.hold} finds")
     return [f"{line}, {AS_AT_REST}" for line in lines]
 
 

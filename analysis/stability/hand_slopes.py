@@ -12,13 +12,14 @@ from functools import lru_cache
 import numpy as np
 
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes
-from hapticlink.components.blocks.hand import SPACE, hand
+from hapticlink.components.blocks.hand import hand
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.hand import Hand
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.base.arrays import Matrix
 
 INPUTS, OUTPUT = ("x", "v"), "F"
-PORTS = 3 * SPACE.size
+PORTS = 3 * PLANE.size
 """Numbers of the ports of a hand that reads pose and velocity: x, v, F."""
 
 
@@ -41,7 +42,7 @@ def hand_slopes(spec: Hand, T: float) -> HandSlopes:
     made = hand(spec)
     functions = {f.name(): f for f in one_pass(made).functions}
     graph = GraphSlopes(functions, made.timing == "sampled", made.substeps)
-    n = SPACE.size
+    n = PLANE.size
     own = [n * (*INPUTS, OUTPUT).index(v.name) + i for v in made.inputs for i in range(n)]
     n_y, n_x = n, sum(v.size for v in made.states)
     places = [*own, *range(2 * n, PORTS + n_x)]

@@ -12,7 +12,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, ProfileHand, SpringHand
+from hapticlink.components.specs.hand import (
+    ArmHand,
+    ConstantHand,
+    Hand,
+    HoldingHand,
+    ProfileHand,
+    SpringHand,
+)
 from hapticlink.orchestrator.base.arrays import Vector
 
 SPRINGS = (100.0, 1000.0)
@@ -77,10 +84,10 @@ def linearise_hand(hand: Hand) -> Hand:
 
 def holds(hand: Hand) -> bool:
     """Whether a hand has a stiffness."""
-    return isinstance(hand, ArmHand | SpringHand)
+    return isinstance(hand, HoldingHand)
 
 
-def standing(hand: ArmHand | SpringHand, pose: Sequence[float] | Vector) -> dict[str, object]:
+def standing(hand: HoldingHand, pose: Sequence[float] | Vector) -> dict[str, object]:
     """The [hand] table of a hand that stands still at a pose (m, m, rad)."""
     table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
     return table | {"target": [[0.0, *map(float, pose)]]}

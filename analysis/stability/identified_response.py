@@ -15,7 +15,7 @@ than the pulses and later, so that what changes with time shows, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,8 +65,8 @@ class IdentifiedSystem:
         return len(self.A)
 
 
-def identify(respond: Respond, u0: Vector) -> IdentifiedSystem:
-    """The system that an FMU is next to the inputs u0. Raises NotIdentified."""
+def identify(respond: Respond, u0: Vector, names: Sequence[str]) -> IdentifiedSystem:
+    """The system that an FMU is next to the inputs u0 of these names. Raises NotIdentified."""
     pulses = PULSE * np.maximum(1.0, np.abs(u0))
     steps = SETTLING + LENGTH
     rest = respond(np.tile(u0, (steps, 1)))
@@ -93,7 +93,7 @@ def identify(respond: Respond, u0: Vector) -> IdentifiedSystem:
     for j in np.flatnonzero(nothing).tolist():
         if (np.abs(pulsed(j, LARGER * pulses[j])) > least).any():
             raise NotIdentified(
-                f"input {j + 1} does nothing by {pulses[j]:.1g} and something by {LARGER:g} times "
+                f"{names[j]} does nothing by {pulses[j]:.1g} and something by {LARGER:g} times "
                 "as much: a count or a dead zone, which has no slope"
             )
     markov = (up - down) / 2 / scale[:, None]

@@ -38,6 +38,7 @@ from hapticlink.analysis.stability.poses import (
     find_rest_poses,
     is_hand_replaced,
     presses,
+    require_planar_port,
     rest,
     simulate_scene,
 )
@@ -101,6 +102,7 @@ def stability(
         return _judge_at_rest(read, bounds, progress)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
+    require_planar_port(read)
     hands = hands_of(read.hand)
     read, rounded = short(with_quicker_fmus(read))
     with interrupt.defer_signals(), process_cache.keep_unpacked(), prefer_compiled():

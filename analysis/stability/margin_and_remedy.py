@@ -7,6 +7,7 @@ A mode that only drifts counts as stable.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ from hapticlink.analysis.search.search import (
     largest_scale,
 )
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
-from hapticlink.analysis.stability.hand_cases import Case, InHands, first_of_largest
+from hapticlink.analysis.stability.hand_cases import TIE, Case, InHands, first_of_largest
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
@@ -71,7 +72,8 @@ class Margin:
     """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
     with frames a period longer it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
-    """The quantities that are stable as far as they were searched: at least these."""
+    """The quantities that are stable as far as they were searched, or next to which no equilibrium
+    was found: at least these."""
     alone: float = 0.0
     """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
     where it is no more than a drift."""
@@ -117,6 +119,8 @@ class _Search:
         self._read, self._pose, self._hands, self._bounds = read, pose, hands, bounds
         self._work, self._steps = work, steps
         self._known: dict[tuple[str, ...], float] = {}
+        self._without: set[tuple[str, float]] = set()
+        """Values, by quantity, with which no equilibrium was found: not known to be unstable."""
         self._own_place: RestingScene | None = None
         self._haptic = exact(self._read.haptics.rate)
 
@@ -142,7 +146,7 @@ class _Search:
         if self._read.graphics is not None:
             self._steps.begin("margin of the graphics rate")
             found["rate"] = self._slowest_frame(stable)
-        beyond = tuple(name for name, limit in found.items() if not limit.limited)
+        beyond = tuple(name for name, limit in found.items() if not self._limited(name, limit))
         stiffness, delay, frame = (found.get(name) for name in ("stiffness", "delay", "rate"))
         return Margin(
             stiffness=stiffness.value if stiffness else None,
@@ -151,6 +155,12 @@ class _Search:
             not_searched_further=beyond,
             alone=self._alone(place),
         )
+
+    def _limited(self, name: str, found: Largest) -> bool:
+        """Whether it is unstable beside the largest value that holds."""
+        above = found.value * math.exp(FINE) if name == "stiffness" else found.value + 1
+        without = (value for quantity, value in self._without if quantity == name)
+        return found.limited and not any(found.value < v <= above * (1 + TIE) for v in without)
 
     def _alone(self, place: RestingScene) -> float:
         with suppress(InputFault, FmuFault):  # no equilibrium with the scene's gains
@@ -176,7 +186,7 @@ class _Search:
             if n == own and stable:
                 return True
             self._steps.tell(f"margin of the graphics rate: {self._frame_rate(n, stable):.3g} Hz")
-            return self._growth([set_rate("graphics", self._haptic / n)]) < 0.0
+            return self._growth([set_rate("graphics", self._haptic / n)], ("rate", n)) < 0.0
 
         return largest_count(holds, own, SLOWEST)
 
@@ -191,18 +201,24 @@ class _Search:
         try:
             scales = {} if scale == 1.0 else dict.fromkeys(place.gains.laws, scale)
             return self._worst(InHands(place, scales, late)) < 0.0
-        except (InputFault, FmuFault):
-            return False
+        except InputFault:
+            self._without.add(("delay", late) if late else ("stiffness", scale))
+        except FmuFault:  # diverges at once
+            pass
+        return False
 
-    def _growth(self, change: Sequence[str]) -> float:
+    def _growth(self, change: Sequence[str], value: tuple[str, float] | None = None) -> float:
         """With a change, the growth rate of a hand in the pose that is unstable, or of the worst
-        one where none is; infinite where there is no equilibrium."""
+        one where none is; infinite where there is no equilibrium, as is noted for the `value` of a
+        quantity."""
         if (change := tuple(change)) not in self._known:
             try:
                 with self.place(change) as (place, _):
                     self._known[change] = self._worst(InHands(place))
-            except (InputFault, FmuFault):
+            except (InputFault, FmuFault) as fault:
                 self._known[change] = float("inf")
+                if value and isinstance(fault, InputFault):
+                    self._without.add(value)
         return self._known[change]
 
     def _worst(self, held: InHands) -> float:

@@ -48,7 +48,7 @@ from hapticlink.analysis.stability.port_response import (
     mechanism_port,
     response,
 )
-from hapticlink.analysis.stability.poses import in_own_hand
+from hapticlink.analysis.stability.poses import in_own_hand, require_planar_port
 from hapticlink.analysis.stability.short_hyperperiod import round_rate
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
@@ -143,6 +143,7 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     device, or with a hyperperiod of more than 600 forces with frames of whole haptic periods, too.
     """
     read, said = open_scene.load(scene, options), ""
+    require_planar_port(read)
     hand, mechanism, count = _ports(read)
     if count > LARGEST and read.graphics is not None:
         read, said = round_rate(read)

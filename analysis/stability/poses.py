@@ -16,8 +16,9 @@ from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
+from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE
-from hapticlink.components.specs.hand import ArmHand, ConstantHand, Hand, SpringHand
+from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
@@ -89,7 +90,7 @@ class Pose:
     def leaves(self, read: Scene, hand: Hand | None) -> bool:
         """Whether the run of a scene from this pose on, in a hand that stands still next to it,
         comes further away than NEAR; one that fails does."""
-        if not isinstance(hand, ArmHand | SpringHand):
+        if not isinstance(hand, HoldingHand):
             return True
         held = {"hand": standing(hand, np.add(self.point, OFF))}
         changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
@@ -108,6 +109,15 @@ class Pose:
         no_force = (0.0, 0.0, 0.0)
         hands = {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
         return {"hand": spring(self.point, self.press, FIRM), **hands}
+
+
+def require_planar_port(scene: Scene) -> None:
+    """Raises InputFault for a linkage in space, which hands from soft to firm do not hold."""
+    if scene.linkage and scene.linkage.dimension > 2:
+        raise InputFault(
+            "its port is judged in the plane: in space `hapticlink stability --equilibrium` judges "
+            "the scene's own hand, where it comes to rest"
+        )
 
 
 def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
@@ -325,6 +335,8 @@ def at_equilibrium(
             at_rest.append(pressed)
             held_at[pose.name] = place
         tell(f"  {len(held_at)} poses with an equilibrium")
+        for each in find_stand_ins(work.responses):
+            tell(f"  {each}")
         if not held_at:
             raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")
         yield at_rest, held_at

@@ -3,7 +3,7 @@ scene is linearised."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass, replace
 from typing import Any
@@ -24,7 +24,7 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 FINE = 1e-12
 """Relative tolerance of the solver of an FMU for model exchange."""
@@ -88,20 +88,29 @@ def _with_declared_states(fmu: Fmu) -> Fmu:
     return replace(fmu, description=replace(about, states=states, flags=flags, tolerance=FINE))
 
 
-def _read_start(system: System) -> Callable[[Fmu], Vector]:
-    """The values that an FMU's connections have at the start of the scene, in signal units."""
+Brought = tuple[list[Scalar], Vector]
+"""Inputs or parameters of an FMU, and the values that connections bring them, in signal units."""
+
+
+def _read_start(system: System) -> Callable[[Iterable[Connection]], Brought]:
+    """What connections bring at the start of the scene."""
     with ExitStack() as stack:
         simulation = Simulation(system, RunResults(), stack)
         simulation.step_checks.clear()
         simulation.start()
         values, signals = simulation.signals.values.copy(), simulation.signals
-    return lambda fmu: np.array(
-        [values[i] for c in system.into(fmu.name) for i in signals.sources(c)]
-    )
+
+    def read(connections: Iterable[Connection]) -> Brought:
+        every = [*connections]
+        places = [i for c in every for i in signals.sources(c)]
+        return [s for c in every for s in c.inputs], values[places]
+
+    return read
 
 
-def _identified(system: System, fmu: Fmu, start: Callable[[Fmu], Vector], known: Known) -> Fmu:
-    inputs = [s for c in system.into(fmu.name) for s in c.inputs]
+def _identified(
+    system: System, fmu: Fmu, start: Callable[[Iterable[Connection]], Brought], known: Known
+) -> Fmu:
     clock = system.timeline.clock(fmu.clock)
 
     def refuse(why: str) -> InputFault:
@@ -116,12 +125,14 @@ def _identified(system: System, fmu: Fmu, start: Callable[[Fmu], Vector], known:
         raise refuse("its response is not identified, as its period varies")
     if any(s.type in WRITTEN for s in fmu.description.scalars):
         raise refuse("its response is not identified, as it passes on texts")
-    T, u0 = system.timeline.seconds(clock.period), start(fmu)
+    T, (inputs, u0) = system.timeline.seconds(clock.period), start(system.into(fmu.name))
+    once = start(c for c in system.connections if c.target == fmu.name and c.initial)
     starts = tuple((scalar.name, value) for scalar, value in fmu.starts)
-    key = fmu.name, fmu.description.path, starts, T, u0.tobytes()
+    key = fmu.name, fmu.description.path, starts, T, u0.tobytes(), once[1].tobytes()
     if key not in known:
         try:
-            known[key] = identify(lambda u: _respond(system, fmu, inputs, u, T), u0)
+            names = [s.name for s in inputs]
+            known[key] = identify(lambda u: _respond(system, fmu, inputs, once, u, T), u0, names)
         except NotIdentified as why:
             raise refuse(f"its response to its inputs tells no linear system: {why}") from None
         except FmuFault as fault:
@@ -134,18 +145,23 @@ def _identified(system: System, fmu: Fmu, start: Callable[[Fmu], Vector], known:
     )
 
     def stand_in(*arguments: Any) -> Instance:
-        return LinearInstance(response, inputs, *arguments)
+        return LinearInstance(response, inputs, once[0], *arguments)
 
     return replace(fmu, description=described, isolate=False, stand_in=stand_in)
 
 
-def _respond(system: System, fmu: Fmu, inputs: Sequence[Scalar], given: Matrix, T: float) -> Matrix:
-    """The outputs of a new instance behind each of its steps of T (s)."""
+def _respond(
+    system: System, fmu: Fmu, inputs: Sequence[Scalar], once: Brought, given: Matrix, T: float
+) -> Matrix:
+    """The outputs of a new instance behind each of its steps of T (s); `once` is what it is brought
+    before the first."""
     alone = replace(system, fmus=(fmu,), connections=(), changes=(), ends_when=None)
     with ExitStack() as stack:
         instance = LoadedFmus(alone, stack).instances[fmu.name]
         places = range(len(inputs))
         instance.enter_initialization(LONG)
+        if once[0]:
+            instance.connect(once[0], range(len(once[0])))(once[1])
         instance.connect(inputs, places)(given[0])
         instance.exit_initialization()
         setter, rows = (
@@ -169,7 +185,11 @@ class LinearInstance(Instance):
     in_c = False
 
     def __init__(
-        self, response: IdentifiedSystem, inputs: Sequence[Scalar], *arguments: Any
+        self,
+        response: IdentifiedSystem,
+        inputs: Sequence[Scalar],
+        once: Sequence[Scalar],
+        *arguments: Any,
     ) -> None:
         super().__init__(*arguments)
         self._response = response
@@ -178,6 +198,7 @@ class LinearInstance(Instance):
         place = {s.name: i for i, s in enumerate(scalars)}
         self._inputs = np.array([place[s.name] for s in inputs], dtype=np.intp)
         self._at = {s.name: i for i, s in enumerate(inputs)}
+        self._once = {s.name for s in once}
         self._results = np.array([place[s.name] for s in self.description.outputs], dtype=np.intp)
         self._n = len(scalars)
         self._state = np.zeros(self._n + response.order)
@@ -189,6 +210,11 @@ class LinearInstance(Instance):
         """Nothing to load."""
 
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
+        if other := [s.name for s in scalars if s.name not in self._at.keys() | self._once]:
+            raise InputFault(
+                f"{self.name}.{other[0]}: a linear system stands for the FMU, identified with the "
+                "value that this had"
+            )
         of = [k for k, s in enumerate(scalars) if s.name in self._at]
         into = self._inputs[[self._at[scalars[k].name] for k in of]]
         where = np.array([places[k] for k in of], dtype=np.intp)

@@ -219,15 +219,15 @@ class Stability:
 
         if margin.stiffness is not None:
             some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")
-            least = f"{2.0**-DOUBLINGS:.1g}"
-            yield some if margin.stiffness else f"unstable with stiffnesses down to times {least}"
+            least = f"down to times {2.0**-DOUBLINGS:.1g}"
+            yield some if margin.stiffness else f"stable with no stiffnesses tried, {least}"
         if margin.delay is not None:
             some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of further delay")
             yield some if margin.delay else "less than a haptic period of further delay"
         if margin.rate is not None:
             down = f"down to {-float(_within(-margin.rate, 3)):g} Hz in whole haptic periods"
             some = told("rate", "graphics ", down)
-            yield some if math.isfinite(margin.rate) else "unstable at each graphics rate tried"
+            yield some if math.isfinite(margin.rate) else "stable at no graphics rate tried"
         if margin.stiffness is None and margin.delay is None and margin.rate is None:
             yield "no coupling and no second rate"
 

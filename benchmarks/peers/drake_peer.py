@@ -20,14 +20,14 @@ from pydrake.systems.analysis import Simulator
 
 from benchmarks.peers.comparable import require_comparable
 from hapticlink.components.specs.linkage import Joint, Linkage
-from hapticlink.components.specs.quantities import Point
+from hapticlink.components.specs.quantities import Place, in_plane
 
 NAME = "Drake"
 METHODS = ("discrete, SAP",)
 
 
-def _place(point: Point | None) -> np.ndarray:
-    return np.array([*(point or (0.0, 0.0)), 0.0])
+def _place(point: Place | None) -> np.ndarray:
+    return np.array([*in_plane(point), 0.0])
 
 
 def _plant(linkage: Linkage, h: float) -> Any:

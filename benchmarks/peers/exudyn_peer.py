@@ -16,6 +16,7 @@ import numpy as np
 
 from benchmarks.maximal import Bodies
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.quantities import Place, in_plane
 
 # The build without range checks, as its documentation advises.
 sys.exudynFast = True  # type: ignore[attr-defined]
@@ -76,8 +77,8 @@ def _build(linkage: Linkage, wrench: np.ndarray, z: np.ndarray, zd: np.ndarray) 
                 item.LoadMassProportional(markerNumber=weight, loadVector=[*linkage.gravity, 0.0])
             )
 
-    def marker(body: str, at: tuple[float, float] | None) -> int:
-        local = np.array(at or (0.0, 0.0)) - centers[body]
+    def marker(body: str, at: Place | None) -> int:
+        local = np.array(in_plane(at)) - centers[body]
         return mbs.AddMarker(
             item.MarkerBodyRigid(bodyNumber=numbers[body], localPosition=[*local, 0.0])
         )

@@ -19,15 +19,15 @@ import pinocchio as pin
 
 from benchmarks.peers.comparable import require_comparable
 from hapticlink.components.specs.linkage import Joint, Linkage
-from hapticlink.components.specs.quantities import Point
+from hapticlink.components.specs.quantities import Place, in_plane
 
 NAME = "Pinocchio"
 METHODS = ("rk4, projected (Python loop)", "rk4, four calls only")
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
-def _at(point: Point | None, angle: float = 0.0) -> pin.SE3:
-    x, y = point or (0.0, 0.0)
+def _at(point: Place | None, angle: float = 0.0) -> pin.SE3:
+    x, y = in_plane(point)
     return pin.SE3(pin.utils.rotate("z", angle), np.array([x, y, 0.0]))
 
 
@@ -46,7 +46,7 @@ class Terms:
     def __init__(self, linkage: Linkage) -> None:
         require_comparable(linkage)
         self.linkage, self.model = linkage, pin.Model()
-        gx, gy = linkage.gravity or (0.0, 0.0)
+        gx, gy = in_plane(linkage.gravity)
         self.model.gravity.linear = np.array([gx, gy, 0.0])
         self._bodies: dict[str, tuple[int, pin.SE3]] = {"ground": (0, pin.SE3.Identity())}
         order: dict[str, list[int]] = {}
@@ -84,7 +84,7 @@ class Terms:
             for freedom in joint.kind.freedoms
         ]
 
-    def _frame(self, name: str, body: str, at: Point | None) -> int:
+    def _frame(self, name: str, body: str, at: Place | None) -> int:
         joint, frame = self._bodies[body]
         return self.model.addFrame(
             pin.Frame(name, joint, 0, frame * _at(at), pin.FrameType.OP_FRAME)

@@ -118,10 +118,17 @@ def _controller(
     return block.controller(controller, linkage.space, length, clutch=clutch, handle=handle)
 
 
-def _hand(hand: Hand, clutch: bool = False, handle: Handle | None = None) -> Component:
+def _hand(
+    hand: Hand,
+    clutch: bool = False,
+    space: Literal["plane", "point"] = "plane",
+    handle: Handle | None = None,
+) -> Component:
     from hapticlink.components.blocks import hand as block
+    from hapticlink.components.port_space import PLANE, POINT
 
-    return block.hand(hand, clutch=clutch, handle=handle)
+    port = PLANE if space == "plane" else POINT
+    return block.hand(hand, port, clutch=clutch, handle=handle)
 
 
 def _discrete_equivalent(rule: str) -> Component:

@@ -31,7 +31,7 @@ from hapticlink.components.dynamics.rendered_directions import (
     rendered_directions,
 )
 from hapticlink.components.paths import signal
-from hapticlink.components.port_space import PLANE, Entries
+from hapticlink.components.port_space import PLANE, Entries, PortSpace
 from hapticlink.components.specs.device import Handle
 from hapticlink.components.specs.hand import (
     ArmHand,
@@ -43,11 +43,17 @@ from hapticlink.components.specs.hand import (
 )
 from hapticlink.components.time_signals import TimeSignal
 
-SPACE = PLANE
-"""Of the port at the handle."""
-_F = Variable("F", *SPACE.wrench, description="wrench of the hand on the handle")
-_X = Variable("x", *SPACE.pose, description="pose of the handle")
-_V = Variable("v", *SPACE.twist, description="velocity of the handle")
+
+def _wrench_output(space: PortSpace) -> Variable:
+    return Variable("F", *space.wrench, description="wrench of the hand on the handle")
+
+
+def _pose(space: PortSpace) -> Variable:
+    return Variable("x", *space.pose, description="pose of the handle")
+
+
+def _velocity(space: PortSpace) -> Variable:
+    return Variable("v", *space.twist, description="velocity of the handle")
 
 
 def _hand(
@@ -71,14 +77,15 @@ def _wrench(
 ) -> Component:
     """F = F(t) - B v, with a damper to ground if the spec has one; 0 while a hand with a clutch
     holds no point."""
-    parameters = []
+    space, parameters = rendered.space, []
     inputs = [grasp.CLUTCH] if clutch else []
     if isinstance(spec, ConstantHand):
-        parameters += [Variable("wrench", *SPACE.wrench, spec.wrench, "wrench on the handle")]
+        parameters += [Variable("wrench", *space.wrench, spec.wrench, "wrench on the handle")]
     if spec.damping is not None:
-        inputs += [_V]
-        parameters += [Variable("damping", *SPACE.damping, spec.damping, "damping to ground")]
-    block, signals = Block(inputs=inputs, parameters=parameters, outputs=[_F]), list[TimeSignal]()
+        inputs += [_velocity(space)]
+        parameters += [Variable("damping", *space.damping, spec.damping, "damping to ground")]
+    block = Block(inputs=inputs, parameters=parameters, outputs=[_wrench_output(space)])
+    signals: list[TimeSignal] = []
     if isinstance(spec, ConstantHand):
         F, kind = block.p["wrench"], "a constant wrench"
     else:
@@ -90,31 +97,44 @@ def _wrench(
     return _hand(block, kind, "sampled", F, signals)
 
 
-def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
+GRIP = {"grip_stiffness": "pulp_stiffness", "grip_damping": "pulp_damping"}
+"""What of an arm's grip is the pulp of a finger."""
+
+
+def _arm(spec: ArmHand | FingertipHand, rendered: RenderedDirections) -> Component:
     """M_a x_a'' = K_a (x_t - x_a) + B_a (x_t' - x_a') - F, with the grip's
     F = K_gr (x_a - x) + B_gr (x_a' - v), in the directions in which it acts."""
+    space = rendered.space
+    is_finger = isinstance(spec, FingertipHand)
+    rows = {
+        "mass": (space.mass, "mass of the arm"),
+        "stiffness": (space.stiffness, "arm to target path"),
+        "damping": (space.damping, "arm to target path"),
+        "grip_stiffness": (space.stiffness, "arm to handle"),
+        "grip_damping": (space.damping, "arm to handle"),
+    }
+    parameters = []
+    for name, (entries, text) in rows.items():
+        own = GRIP.get(name, name) if is_finger else name
+        shape, unit = ((), entries.units[0]) if is_finger else entries
+        parameters.append(Variable(own, shape, unit, getattr(spec, own), text))
     block = Block(
-        inputs=[_X, _V],
-        parameters=[
-            Variable("mass", *SPACE.mass, spec.mass, "mass of the arm"),
-            Variable("stiffness", *SPACE.stiffness, spec.stiffness, "arm to target path"),
-            Variable("damping", *SPACE.damping, spec.damping, "arm to target path"),
-            Variable("grip_stiffness", *SPACE.stiffness, spec.grip_stiffness, "arm to handle"),
-            Variable("grip_damping", *SPACE.damping, spec.grip_damping, "arm to handle"),
-        ],
+        inputs=[_pose(space), _velocity(space)],
+        parameters=parameters,
         states=[
-            Variable("x_arm", *_of(rendered, SPACE.pose), description="pose of the arm"),
-            Variable("v_arm", *_of(rendered, SPACE.twist), description="velocity of the arm"),
+            Variable("x_arm", *_of(rendered, space.pose), description="pose of the arm"),
+            Variable("v_arm", *_of(rendered, space.twist), description="velocity of the arm"),
             *_turns(rendered),
         ],
-        outputs=[_F],
+        outputs=[_wrench_output(space)],
     )
     x, u, t = block.x, block.u, block.t
-    p = {name: rendered.pick_diagonal(block.p[name]) for name in block.p}
-    pick = rendered.pick
+    given_p = [block.p[v.name] for v in parameters]
+    along = given_p if is_finger else [rendered.pick_diagonal(value) for value in given_p]
+    p, pick = dict(zip(rows, along, strict=True)), rendered.pick
     signals = [signal(spec.target, spec.interpolation, "hand.target")]
     over = ca.SX.sym("over", time_signals.size_over(signals))
-    target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), SPACE.size)
+    target, target_rate = ca.vertsplit(time_signals.within(signals, over, t), space.size)
     target = _turned(target, x)
     F = p["grip_stiffness"] * (x["x_arm"] - pick(u["x"]))
     F += p["grip_damping"] * (x["v_arm"] - pick(u["v"]))
@@ -127,7 +147,7 @@ def _arm(spec: ArmHand, rendered: RenderedDirections) -> Component:
     initial |= _first_turns(rendered, u["x"], signals[0].value(ca.SX(0)))
     k = range(rendered.size)
     step = integrators.step("rk4", ode, x.vector, given, block.p.vector, t, block.h, k)
-    kind = "an arm behind a grip"
+    kind = "a fingertip" if is_finger else "an arm behind a grip"
     F = rendered.put(F)
     return _hand(block, kind, spec.timing, F, signals, initial=initial, step=step)
 
@@ -155,32 +175,32 @@ def _turned(target: ca.SX, x: Signals) -> ca.SX:
     """A target's pose with its angle taken on by the whole turns of the state."""
     if TURNS not in x:
         return target
-    return target + 2 * ca.pi * x[TURNS] * ca.vertcat(ca.SX(SPACE.size - 1, 1), 1)
+    return target + 2 * ca.pi * x[TURNS] * ca.vertcat(ca.SX(target.numel() - 1, 1), 1)
 
 
 def _spring(spec: SpringHand, rendered: RenderedDirections) -> Component:
     """F = K (x_t - x) + B (x_t' - v)."""
-    damped = spec.damping is not None
-    parameters = [Variable("stiffness", *SPACE.stiffness, spec.stiffness, "to target path")]
+    space, damped = rendered.space, spec.damping is not None
+    parameters = [Variable("stiffness", *space.stiffness, spec.stiffness, "to target path")]
     if spec.damping is not None:
-        parameters.append(Variable("damping", *SPACE.damping, spec.damping, "to target path"))
+        parameters.append(Variable("damping", *space.damping, spec.damping, "to target path"))
     still = spec.target[0][1:] if isinstance(spec.target, tuple) and len(spec.target) == 1 else None
     if still:
-        parameters.append(Variable("target", *SPACE.pose, still, "pose that the spring pulls to"))
+        parameters.append(Variable("target", *space.pose, still, "pose that the spring pulls to"))
     block = Block(
-        inputs=[_X, _V] if damped else [_X],
+        inputs=[_pose(space), _velocity(space)][: 1 + damped],
         parameters=parameters,
         states=_turns(rendered),
-        outputs=[_F],
+        outputs=[_wrench_output(space)],
     )
     signals = [] if still else [signal(spec.target, spec.interpolation, "hand.target")]
     if still:
         target = first = block.p["target"]
-        rate = ca.SX(SPACE.size, 1)
+        rate = ca.SX(space.size, 1)
     else:
-        target, rate = ca.vertsplit(signals[0].at(block.t), SPACE.size)
+        target, rate = ca.vertsplit(signals[0].at(block.t), space.size)
         first = signals[0].value(ca.SX(0))
-    F = block.p["stiffness"] * SPACE.difference(_turned(target, block.x), block.u["x"])
+    F = block.p["stiffness"] * space.difference(_turned(target, block.x), block.u["x"])
     if damped:
         F += block.p["damping"] * (rate - block.u["v"])
     initial = _first_turns(rendered, block.u["x"], first)
@@ -189,32 +209,16 @@ def _spring(spec: SpringHand, rendered: RenderedDirections) -> Component:
     return _hand(block, kind, spec.timing, F, signals, initial=initial, step=kept)
 
 
-def _fingertip(spec: FingertipHand) -> ArmHand:
-    """The arm that a fingertip is: a finger behind its pulp, with forces alone."""
-
-    def of_lengths(value: float) -> tuple[float, float, float]:
-        return value, value, 0.0
-
-    return ArmHand(
-        mass=(spec.mass, spec.mass, 1.0),
-        stiffness=of_lengths(spec.stiffness),
-        damping=of_lengths(spec.damping),
-        grip_stiffness=of_lengths(spec.pulp_stiffness),
-        grip_damping=of_lengths(spec.pulp_damping),
-        target=spec.target,
-        interpolation=spec.interpolation,
-        timing=spec.timing,
-    )
-
-
-def hand(spec: Hand, *, clutch: bool = False, handle: Handle | None = None) -> Component:
-    """The hand that `spec` describes. clutch: it lets go of the points of a mechanism (grasp.py),
-    and then its wrench is 0; an arm and a spring keep the handle. handle: of a device on which it
-    acts in some directions alone: F is without what the device's bearings take."""
-    rendered = rendered_directions(handle)
+def hand(
+    spec: Hand, space: PortSpace = PLANE, *, clutch: bool = False, handle: Handle | None = None
+) -> Component:
+    """The hand that `spec` describes, at a port. clutch: it lets go of the points of a mechanism
+    (grasp.py), and then its wrench is 0; an arm and a spring keep the handle. handle: of a device
+    on which it acts in some directions alone: F is without what the device's bearings take."""
+    rendered = rendered_directions(handle, space)
     if isinstance(spec, FingertipHand):
         point = rendered_directions(Handle(body="", angle="free"))
-        return _arm(_fingertip(spec), point if rendered.has_moments else rendered)
+        return _arm(spec, point if rendered.has_moments else rendered)
     if isinstance(spec, ArmHand):
         return _arm(spec, rendered)
     if isinstance(spec, SpringHand):

@@ -22,9 +22,13 @@ from hapticlink.components.dynamics.closed_loop_solver import (
 )
 from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.projection import projection
+from hapticlink.components.dynamics.redundant_closures import (
+    is_overconstrained,
+    least_pivot,
+    nearest_closed,
+)
 from hapticlink.components.forces import friction, gravity
 from hapticlink.components.integrators.base import Integrator, MechanicalSystem
-from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import same_point
 from hapticlink.components.specs.linkage import Mechanism
 from hapticlink.components.time_signals import TimeSignal
@@ -113,6 +117,9 @@ class MechanismSteps(MechanicalSystem):
             closing -= 2 * alpha * beta * model.rate(model.h) + alpha**2 * model.h
         qdd = self._space.solver.follow(efforts, closing, refined=method.extrapolates)
         ode = ca.Function("ode", [x, u, p, t], [ca.vertcat(model.qd, qdd, rates)], _ONCE)
+        if self._nearest is not None:
+            at = ca.vertcat(self._nearest(model.q, p), x[self.n :])
+            ode = ca.Function("nearest", [x, u, p, t], [ode(at, u, p, t)], _ONCE)
         if touching:
             self._require_buildable(ode.n_instructions(), len(touching.sides))
         return self.projected(integrators.step(method, ode, x, self.u, p, t, self.h, range(self.n)))
@@ -226,6 +233,17 @@ class MechanismSteps(MechanicalSystem):
         inertia: Inertia = tree
         if softened:
             inertia = MatrixInertia(model.D + A, tree.k, model.leaf_to_root, tree.d)
-        solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage))
+        pivot = least_pivot(model.linkage)
+        solver = ClosedLoopSolver(inertia, model.W, model.rows, pivot=pivot)
         a = solver.follow(model.momentum(V) + b, -model.W @ s)
-        return ca.Function("solved", [model.q, V, b, A, s, self.p], [a], _ONCE)
+        solved = ca.Function("solved", [model.q, V, b, A, s, self.p], [a], _ONCE)
+        if self._nearest is None:
+            return solved
+        at = self._nearest(model.q, self.p)
+        a = solved(at, V, b, A, s, self.p)
+        return ca.Function("nearest", [model.q, V, b, A, s, self.p], [a], _ONCE)
+
+    @cached_property
+    def _nearest(self) -> ca.Function | None:
+        """(q, p) -> the closed pose at which accelerations are solved, None where at q itself."""
+        return nearest_closed(self._model) if is_overconstrained(self._model.linkage) else None

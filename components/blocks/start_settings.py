@@ -31,6 +31,8 @@ START_SETTINGS = {
         "hand.damping": "damping",
         "hand.grip_stiffness": "grip_stiffness",
         "hand.grip_damping": "grip_damping",
+        "hand.pulp_stiffness": "pulp_stiffness",
+        "hand.pulp_damping": "pulp_damping",
     },
 }
 """By block, and by dotted key of its settings: the parameter that starts at the setting, entry by
@@ -79,7 +81,7 @@ def has_free_start(settings: Mapping[str, Any]) -> bool:
         and not (settings.get("contacts") or settings.get("local_model"))
         and not (linkage.start_velocity or linkage.choices or linkage.rubbing or linkage.force)
         and all(gear.offset is not None for gear in linkage.gear)
-        and all(body.mass and body.inertia for body in linkage.body)
+        and all(body.mass and body.moments[0] for body in linkage.body)
     )
 
 

@@ -90,7 +90,7 @@ def virtual_environment(
     model = LinkageModel(
         linkage, block.p, block.x["q"], block.x["qd"], point=block.x.get(grasp.READY)
     )
-    q1, qd1 = follow_mechanism.step(block, model, copy)
+    q1, qd1 = model.shortened(*follow_mechanism.step(block, model, copy))
     q0, qd0 = assemble(LinkageModel(linkage, block.p, block.p["q_start"], block.p["qd_start"]))
     initial, step = {"q": q0, "qd": qd0}, {"q": q1, "qd": qd1}
     output = {"x": model.x_h, "v": model.v_h, "q": model.q}

@@ -317,9 +317,10 @@ class _Equations:
         kept = ca.SX(0, 1)
         if self._sides and self._sides_in_step is not None:
             kept = ca.vec(self._sides.after_step(self._sides_in_step, moved[:n], self._block.p).T)
+        q = refuse_jumps(self.model, moved[:n], moved[n : 2 * n], self._block.h)
         return ca.vertcat(
-            refuse_jumps(self.model, moved[:n], moved[n : 2 * n], self._block.h),
-            moved[n:],
+            *self.model.shortened(q, moved[n : 2 * n]),
+            moved[2 * n :],
             kept,
             ca.vertcat(ca.SX(0, 1), *counted) + growth,
             *(directed.after for directed in self._directions.values()),

@@ -13,7 +13,7 @@ import math
 from hapticlink.components.specs.bodies import counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts, Pair, pairs
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.components.specs.quantities import Point
+from hapticlink.components.specs.quantities import Point, in_plane
 
 ORIGIN = (0.0, 0.0)
 
@@ -23,16 +23,16 @@ def reach(linkage: Linkage, body: str) -> tuple[Point, float]:
     by_child = {j.child: j for j in linkage.joint}
     shape = next(b for b in linkage.body if b.name == body)
     joint = by_child[body]
-    here = joint.at_child or ORIGIN
+    here = in_plane(joint.at_child)
     length = max(math.dist(here, end) for end in shape.shape) + (shape.radius or 0.0)
     while True:
         if joint.kind.slides:
             return ORIGIN, math.inf
-        there = joint.at_parent or ORIGIN
+        there = in_plane(joint.at_parent)
         if joint.parent == "ground":
             return there, length
         joint = by_child[joint.parent]
-        length += math.dist(there, joint.at_child or ORIGIN)
+        length += math.dist(there, in_plane(joint.at_child))
 
 
 def near(linkage: Linkage, contacts: Contacts) -> tuple[Pair, ...]:

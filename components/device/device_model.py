@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 
 from hapticlink.components.component import Signals, Variable
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
-from hapticlink.components.linkage.closures import rows
-from hapticlink.components.linkage.model import Frame, LinkageModel
+from hapticlink.components.linkage.frame import Frame
+from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.linkage.parameters import body_parameters
 from hapticlink.components.specs.device import Device, DeviceJoint
 from hapticlink.components.specs.linkage import coordinates
@@ -304,7 +304,7 @@ class DeviceModel(ABC):
         free = W.shape[1] - rank
         handle = self.device.handle
         ways = f'handle.angle = "{handle.angle}"' + (" and `along`" if handle.along else "")
-        if free != k or rank < sum(rows(self.device.linkage)):
+        if free != k or rank < len(W):
             raise ValueError(
                 f"its linkage has {free} degrees of freedom, and {ways} leaves {k} to be felt: "
                 "give `along` to one of one, a held angle to one of three"

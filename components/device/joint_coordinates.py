@@ -22,7 +22,8 @@ import casadi as ca
 
 from hapticlink.components.component import Signals
 from hapticlink.components.device.device_model import DeviceModel, Parameters
-from hapticlink.components.linkage.model import Frame, LinkageModel
+from hapticlink.components.linkage.frame import Frame
+from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.device import Device, DeviceJoint
 
 

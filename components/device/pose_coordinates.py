@@ -30,8 +30,9 @@ import numpy as np
 
 from hapticlink.components.device.device_model import DeviceModel, Parameters
 from hapticlink.components.device.groups import Anchor, Dyad, PinPlace
-from hapticlink.components.linkage.model import Frame
+from hapticlink.components.linkage.frame import Frame
 from hapticlink.components.linkage.poses import poses
+from hapticlink.components.linkage.rotations import Z_AXIS
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device, DeviceJoint
 
@@ -164,11 +165,11 @@ class PoseCoordinates(DeviceModel):
         k, handle, none = y.numel(), self.device.handle, ca.SX(2, 1)
         v = ca.SX(k, 1) if v is None else v
         still = Point(none, ca.SX(2, k), none), ca.SX(1, k), ca.SX(0), ca.SX(0)
-        bodies = {"ground": PlacedBody(Frame.turned(none, ca.SX(0)), *still)}
+        bodies = {"ground": PlacedBody(Frame.world(2), *still)}
         solved = list[Solved]()
         point = Point(y[:2], ca.SX.eye(k)[:2, :], none)
         if handle.angle == "held":
-            local, frame = p.get("operational_point.at"), Frame.turned(none, y[2])
+            local, frame = p.get("operational_point.at"), Frame.world(2).turned(Z_AXIS, y[2])
             motion = ca.SX.eye(k)[2:, :], v[2], ca.SX(0)
             bodies[handle.body] = self._on_pin(point, local, y[2], frame.rotation, *motion)
         for dyad, turns in zip(self._dyads, self._turns, strict=True):
@@ -234,7 +235,7 @@ class PoseCoordinates(DeviceModel):
     ) -> PlacedBody:
         """The body at an angle whose point `local` is at a pin."""
         origin = pin.at if local is None else pin.at - rotation @ local
-        return PlacedBody(Frame(origin, angle, rotation), pin, *motion)
+        return PlacedBody(Frame(origin, rotation, angle), pin, *motion)
 
     def _side(self, anchor: Anchor, elbow: PinPlace, p: Parameters) -> tuple[ca.SX, ca.SX]:
         """Length (m) of the side from anchor to elbow, and itself in the body's frame."""

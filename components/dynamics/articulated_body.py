@@ -1,9 +1,10 @@
 """Products with D and D^-1 of a tree in O(n): the articulated-body recursion.
 
-Featherstone, Rigid Body Dynamics Algorithms (2008), sections 5.3 and 7.3, in the plane. Spatial
-vectors (omega, v_x, v_y) are expressed in the world's axes at the coordinate's own joint point; X
-transforms them from the parent's point, and X' transforms forces back (so a revolute S is
-(1, 0, 0), and a mechanism far from the origin loses no accuracy):
+Featherstone, Rigid Body Dynamics Algorithms (2008), sections 5.3 and 7.3. Spatial vectors,
+(omega, v_x, v_y) in the plane and (omega, v) in space, are expressed in the world's axes at the
+coordinate's own joint point; X transforms them from the parent's point, and X' transforms forces
+back (so a revolute S in the plane is (1, 0, 0), and a mechanism far from the origin loses no
+accuracy):
 
     leaf to root   U_i = I_i S_i,  d_i = S_i' U_i,  I_parent += X_i' (I_i - U_i U_i'/d_i) X_i
     inward b       u_i = b_i - S_i' p_i,  p_parent += X_i' (p_i + U_i u_i/d_i)
@@ -41,13 +42,18 @@ class Coordinate:
 
 
 def to_point(r: ca.SX) -> ca.SX:
-    """X with (v_x, v_y, omega) at an offset r (m) = X (omega, v_x, v_y) here."""
-    return ca.vertcat(ca.horzcat(-r[1], 1, 0), ca.horzcat(r[0], 0, 1), ca.horzcat(1, 0, 0))
+    """X with (v, omega) at an offset r (m) = X (omega, v) here."""
+    d = r.numel()
+    across = ca.vertcat(-r[1], r[0]) if d == 2 else -ca.skew(r)  # omega x r
+    turns = ca.SX.eye(across.shape[1])
+    both = ca.horzcat(across, ca.SX.eye(d)), ca.horzcat(turns, ca.SX(turns.shape[0], d))
+    return ca.sparsify(ca.vertcat(*both))
 
 
 def _shift(r: ca.SX) -> ca.SX:
-    """X with (omega, v_x, v_y) at an offset r (m) = X (omega, v_x, v_y) here."""
-    return ca.sparsify(to_point(r))[[2, 0, 1], :]
+    """X with (omega, v) at an offset r (m) = X (omega, v) here."""
+    d, X = r.numel(), to_point(r)
+    return ca.vertcat(X[d:, :], X[:d, :])
 
 
 def symmetric(A: ca.SX) -> ca.SX:
@@ -59,33 +65,44 @@ def _coordinates(model: LinkageModel, extra: Mapping[str, tuple[ca.SX, ca.SX]]) 
     """The coordinates from the ground outward; a body's inertia belongs to the last coordinate of
     its joint."""
     coordinates: list[Coordinate] = []
-    tip: dict[str, tuple[int | None, ca.SX]] = {"ground": (None, ca.SX(2, 1))}
-    bodies = {b.name: b for b in model.linkage.body}
+    tip: dict[str, tuple[int | None, ca.SX]] = {"ground": (None, ca.SX(model.d, 1))}
     for joint in model.outward:
-        body = bodies[joint.child]
-        m, inertia = model.p[f"{body.name}.mass"], model.p[f"{body.name}.inertia"]
+        body = joint.child
         pivot, twists = model.twists(joint)
+        size = twists[0].numel()
         parent, before = tip[joint.parent]
-        X = ca.sparsify(to_point(model.centers[body.name] - pivot))
-        own = symmetric(X.T @ ca.diag(ca.vertcat(m, m, inertia)) @ X)
-        if body.name in extra:
-            point, K = extra[body.name]
-            X = ca.sparsify(to_point(point - pivot))
+        X = to_point(model.centers[body] - pivot)
+        mass = [model.p[f"{body}.mass"]] * model.d
+        M = ca.diagcat(*mass, _in_world(model, body))
+        own = symmetric(X.T @ M @ X)
+        if body in extra:
+            point, K = extra[body]
+            X = to_point(point - pivot)
             own = own + symmetric(X.T @ K @ X)
         for k, S in enumerate(twists):
             last = k == len(twists) - 1
-            shift = _shift(pivot - before) if k == 0 else ca.SX.eye(3)
+            shift = _shift(pivot - before) if k == 0 else ca.SX.eye(size)
             index = model.coordinate(joint.name) + k
-            coordinates.append(Coordinate(index, parent, shift, S, own if last else ca.SX(3, 3)))
+            none = ca.SX(size, size)
+            coordinates.append(Coordinate(index, parent, shift, S, own if last else none))
             parent = len(coordinates) - 1
         tip[joint.child] = parent, pivot
     return coordinates
 
 
+def _in_world(model: LinkageModel, body: str) -> ca.SX:
+    """The inertia of a body about its centre of mass in the world's axes: 1 x 1 in the plane, else
+    3 x 3."""
+    inertia, rotation = model.inertia(body), model.frames[body].rotation
+    if inertia.numel() == 1:
+        return inertia if model.d == 2 else inertia * ca.SX.eye(3)
+    return symmetric(rotation @ inertia @ rotation.T)
+
+
 class TreeInertia:
     """D + sum over bodies of J_b' K_b J_b, as an operator on n x r matrices.
 
-    extra: for a body, a point (m, in the world) and the symmetric K_b for (v_x, v_y, omega) there.
+    extra: for a body, a point (m, in the world) and the symmetric K_b for (v, omega) there.
     """
 
     def __init__(
@@ -96,7 +113,8 @@ class TreeInertia:
         articulated = [c.inertia for c in self._tree]
         self.k = added_inertia(model, model.W)
         # U/d by coordinate, and d in the order of q.
-        self._gain: list[ca.SX] = [ca.SX(3, 1)] * self.n
+        size = self._size = self._tree[0].S.numel() if self._tree else 0
+        self._gain: list[ca.SX] = [ca.SX(size, 1)] * self.n
         d: list[ca.SX] = [ca.SX(0)] * self.n
         for i in reversed(range(self.n)):
             c = self._tree[i]
@@ -116,7 +134,7 @@ class TreeInertia:
 
     def inward(self, b: ca.SX) -> ca.SX:
         """Remaining effort at each coordinate if those outward of it move freely, n x r."""
-        p = [ca.SX(3, b.shape[1])] * self.n
+        p = [ca.SX(self._size, b.shape[1])] * self.n
         rows = [ca.SX(1, b.shape[1])] * self.n
         for i in reversed(range(self.n)):
             c = self._tree[i]
@@ -135,7 +153,7 @@ class TreeInertia:
         A: list[ca.SX] = []
         rows = [ca.SX(1, u.shape[1])] * self.n
         for i, c in enumerate(self._tree):
-            before = ca.SX(3, u.shape[1]) if c.parent is None else c.X @ A[c.parent]
+            before = ca.SX(self._size, u.shape[1]) if c.parent is None else c.X @ A[c.parent]
             a = u[c.index, :] - self._gain[i].T @ before
             A.append(before + c.S @ a)
             rows[c.index] = a
@@ -146,7 +164,7 @@ class TreeInertia:
         r = a.shape[1]
         A: list[ca.SX] = []
         for c in self._tree:
-            before = ca.SX(3, r) if c.parent is None else c.X @ A[c.parent]
+            before = ca.SX(self._size, r) if c.parent is None else c.X @ A[c.parent]
             A.append(before + c.S @ a[c.index, :])
         f = [c.inertia @ A[i] for i, c in enumerate(self._tree)]
         rows = [ca.SX(1, r)] * self.n

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from hapticlink.components.component import Component, Signals
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, UnitInertia
 from hapticlink.components.dynamics.variables import parameters, start_parameters
-from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Linkage, coordinates
 
@@ -43,10 +42,10 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     qd with the rates of `start_velocity`, or the nearest ones if these are not consistent."""
     q, qd = model.q, model.qd
     if not model.linkage.closed:
-        return q, qd
-    n, count = q.numel(), rows(model.linkage)
+        return model.shortened(q, qd)
+    n = q.numel()
     symbolic = LinkageModel.symbolic(model.linkage, model.p)
-    symbols = symbolic.q, symbolic.qd
+    symbols, count = (symbolic.q, symbolic.qd), symbolic.rows
     least = ClosedLoopSolver(UnitInertia(n), symbolic.W, count, MU)
     parameters = model.p.vector
     shared = {"cse": True}
@@ -67,7 +66,7 @@ def assemble(model: LinkageModel) -> tuple[ca.SX, ca.SX]:
     for project in map(projected, solvers):
         for _ in range(RATE_STEPS):
             qd = project(q, qd, parameters)
-    return q, qd
+    return model.shortened(q, qd)
 
 
 def start_coordinates(linkage: Linkage) -> NDArray[np.float64]:
@@ -91,10 +90,20 @@ def require_assembled(component: Component, model: LinkageModel) -> None:
     n = model.q.numel()
     start = component.initialize(component.start_inputs, component.start_parameters)
     q, qd = start[:n], np.array(start[n : 2 * n]).ravel()
-    gaps = [ca.norm_2(closure.h) for closure in model.closures]
-    gap_function = ca.Function("gaps", [model.q, model.p.vector], [ca.vertcat(ca.SX(0, 1), *gaps)])
-    left_open = np.array(gap_function(q, component.start_parameters)).ravel().tolist()
-    for closure, left in zip(model.closures, left_open, strict=True):
+    none = ca.SX(0, 1)
+    gaps = ca.vertcat(none, *(ca.norm_2(closure.h) for closure in model.closures))
+    fixed = ca.vertcat(none, *(ca.norm_2(ca.vertcat(c.constant, 0)) for c in model.closures))
+    gap_function = ca.Function("gaps", [model.q, model.p.vector], [gaps, fixed])
+    left_open, constant = (
+        np.array(gap).ravel() for gap in gap_function(q, component.start_parameters)
+    )
+    for closure, left, never in zip(model.closures, left_open, constant, strict=True):
+        if not never < TOLERANCE:
+            raise AssemblyError(
+                f"loop `{closure.name}` ({closure.joins}) can never close: no coordinate moves "
+                f"{closure.constant.numel()} of its rows, and {never:.3g} m are left; check its "
+                "points and axes"
+            )
         if not left < TOLERANCE:
             raise AssemblyError(
                 f"loop `{closure.name}` ({closure.joins}) does not close: "

@@ -158,10 +158,15 @@ class MatrixInertia:
 
 class ClosedLoopSolver:
     """Factors of D and W (m x n), with the number of rows of each closure; for m = 0 it applies
-    D^-1."""
+    D^-1. pivot: the floor of the pivots of S without mu."""
 
     def __init__(
-        self, inertia: Inertia, W: ca.SX, rows: Sequence[int], mu: float | None = None
+        self,
+        inertia: Inertia,
+        W: ca.SX,
+        rows: Sequence[int],
+        mu: float | None = None,
+        pivot: float = PIVOT,
     ) -> None:
         self.inertia, self.W, self.m = inertia, W, W.shape[0]
         self._d_inv = ca.diag(1 / (inertia.d + inertia.k))
@@ -172,7 +177,7 @@ class ClosedLoopSolver:
             self.S = symmetric(self._Z.T @ self._Y)
             self.scale = closure_scale(self.S, rows)
             self._sharp = (
-                Factored(self.S, PIVOT * self.scale)
+                Factored(self.S, pivot * self.scale)
                 if mu is None
                 else Regularised(self.S, mu * self.scale)
             )

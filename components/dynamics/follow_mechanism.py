@@ -25,7 +25,6 @@ from hapticlink.components.component import Block, Variable
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
 from hapticlink.components.dynamics.projection import MU, projection
-from hapticlink.components.linkage.closures import rows
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.linkage import GraphicsCopy, Linkage, coordinates
@@ -107,13 +106,13 @@ def pull_copy(block: Block, model: LinkageModel, joint_sync: bool) -> tuple[ca.S
     u, p, h, q, qd = block.u, block.p, block.h, model.q, model.qd
     D = TreeInertia(model)
     if joint_sync:
-        solver = ClosedLoopSolver(D, model.W, rows(model.linkage), MU)
+        solver = ClosedLoopSolver(D, model.W, model.rows, MU)
         pull = D.apply(p["K_g"] * (u["q_ref"] - q) + p["B_g"] * u["qd_ref"])
         weight = 1 + h * p["B_g"] + h**2 * p["K_g"]
     else:
         space, K_g, B_g = model.linkage.space, ca.diag(p["K_g"]), ca.diag(p["B_g"])
         added = {model.linkage.held.body: (model.x_h[:2], h * B_g + h**2 * K_g)}
-        solver = ClosedLoopSolver(TreeInertia(model, added), model.W, rows(model.linkage), MU)
+        solver = ClosedLoopSolver(TreeInertia(model, added), model.W, model.rows, MU)
         pull = model.J_h.T @ (K_g @ space.difference(u["x_ref"], model.x_h) + B_g @ u["v_ref"])
         weight = ca.SX(1)
     momentum = D.apply(qd) + h * (pull - model.C_qd)

@@ -25,13 +25,11 @@ more than the mean link length, ends the run.
 
 from __future__ import annotations
 
-import math
-
 import casadi as ca
 import numpy as np
 
 from hapticlink.components.component import Component
-from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.model import LinkageModel, turn_axis
 from hapticlink.components.linkage.parameters import mean_link_length
 from hapticlink.components.specs.linkage import Body, Joint, Linkage
 
@@ -61,14 +59,24 @@ def _way(linkage: Linkage, body: str) -> set[str]:
 
 def smallest_inertia(joint: Joint, body: Body) -> list[float]:
     """The smallest inertia of a body at each coordinate of its joint (kg or kg.m2)."""
-    arm = math.dist(body.center or (0.0, 0.0), joint.at_child or (0.0, 0.0))
-    turning = body.inertia + body.mass * arm**2
-    sliding = body.mass
-    if joint.kind.turns:  # the body may turn out of the way of its mass
-        sliding = body.mass * body.inertia / turning if turning else 0.0
+    lever = np.subtract(*((*(at or (0.0, 0.0)), 0.0)[:3] for at in (body.center, joint.at_child)))
+    least, arm = body.moments[0], 0.0  # about the line through its centre of mass
+    turns = [freedom for freedom in joint.kind.freedoms if freedom.turns]
+    if len(turns) == 1:
+        axis = np.array(turn_axis(joint, turns[0]))
+        least = float(axis @ body.inertia_tensor @ axis)
+        arm = float(np.linalg.norm(np.cross(axis, lever)))
+    turning, sliding = least + body.mass * arm**2, body.mass
+    if turns:  # the body may turn out of the way of its mass
+        whole = least + body.mass * float(lever @ lever)
+        sliding = body.mass * least / whole if whole else 0.0
     if joint.kind.slides:  # or turn about its centre of mass
-        turning = body.inertia
-    return [turning if freedom.turns else sliding for freedom in joint.kind.freedoms]
+        turning = least
+    of_ball = turning / 4  # half a turn from 0 its coordinates are twice the angle
+    return [
+        (of_ball if f.about == "ball" else turning) if f.turns else sliding
+        for f in joint.kind.freedoms
+    ]
 
 
 def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
@@ -78,7 +86,7 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
     for group in groups(linkage):
         names = {j.name for j in group}
         moved = [b for b in linkage.body if names & _way(linkage, b.name)]
-        mean = sum(b.mass + b.inertia / length**2 for b in moved) / len(moved)
+        mean = sum(b.mass + b.moments[0] / length**2 for b in moved) / len(moved)
         turning, light = [], []
         for joint in group:
             for i, own in enumerate(smallest_inertia(joint, bodies[joint.child])):
@@ -87,10 +95,16 @@ def added_inertia(model: LinkageModel, W: ca.SX) -> ca.SX:
                 turning += [index] if turns else []
                 light += [index] if own < LIGHT * mean * (length**2 if turns else 1) else []
         arm = ca.sumsqr(W[:, turning]) / len(turning) if turning else ca.SX(1)
-        M = sum(p[f"{b.name}.mass"] + p[f"{b.name}.inertia"] / arm for b in moved) / len(moved)
+        masses = (p[f"{b.name}.mass"] + _mean(p[f"{b.name}.inertia"]) / arm for b in moved)
+        M = sum(masses) / len(moved)
         for index in light:
             k[index] = M * arm if index in turning else M
     return k
+
+
+def _mean(inertia: ca.SX) -> ca.SX:
+    """The mean of a body's moments of inertia (kg.m2)."""
+    return inertia if inertia.numel() == 1 else ca.sum1(inertia[:3]) / 3
 
 
 SINGULAR = 1e-10  # relative to the same matrix with mass and inertia everywhere
@@ -103,25 +117,28 @@ class MasslessError(ValueError):
 def require_inertia(component: Component, model: LinkageModel) -> None:
     """Raises MasslessError for a massless body that is free to move at the default start pose."""
     bodies, n = model.linkage.body, model.q.numel()
-    if all(b.mass and b.inertia for b in bodies):
+    if all(b.mass and b.moments[0] for b in bodies):
         return
     from scipy.linalg import eigh, null_space  # slow to load
 
     start = component.initialize(component.start_inputs, component.start_parameters)[:n]
-    poses = ca.vertcat(
-        *(ca.vertcat(model.centers[b.name], model.frames[b.name].angle) for b in bodies)
-    )
-    jacobians = ca.Function("J", [model.q, model.p.vector], [ca.jacobian(poses, model.q), model.W])
-    J, W = (np.array(v) for v in jacobians(start, component.start_parameters))
+    weighted = model.bodies.values()
+    poses, weights = (ca.vertcat(*parts) for parts in zip(*weighted, strict=True))
+    functions = [ca.jacobian(poses, model.q), model.W, weights]
+    jacobians = ca.Function("J", [model.q, model.p.vector], functions)
+    J, W, M = (np.array(v) for v in jacobians(start, component.start_parameters))
     moves = J @ (null_space(W, 1e-9) if len(W) else np.eye(n))
-    size = np.tile([1.0, 1.0, mean_link_length(model.linkage) ** 2], len(bodies))
-    has = np.ravel([(b.mass > 0, b.mass > 0, b.inertia > 0) for b in bodies])
+    d, length = model.d, mean_link_length(model.linkage)
+    lengths = [[1.0] * d + [length**2] * (pose.numel() - d) for pose, _ in weighted]
+    size, has = np.concatenate(lengths), M.ravel() != 0
     values, motions = eigh((moves.T * (size * has)) @ moves, (moves.T * size) @ moves)
     if values.size and values[0] < SINGULAR:
         motion = size * (moves @ motions[:, 0]) ** 2
-        shares = (motion * ~has).reshape(-1, 3).sum(1)
-        body = bodies[int(shares.argmax())]
-        what = " and ".join(w for w in ("mass", "inertia") if not getattr(body, w))
+        ends = np.cumsum([len(of) for of in lengths])[:-1]
+        shares = [float(part.sum()) for part in np.split(motion * ~has, ends)]
+        body = bodies[int(np.argmax(shares))]
+        lacks = (("mass", not body.mass), ("inertia", not body.moments[0]))
+        what = " and ".join(name for name, is_lacking in lacks if is_lacking)
         raise MasslessError(
             f"body `{body.name}` has {what} 0, and from the start pose it can move without moving "
             f"anything that has: give it {what}, or loops that leave it no freedom of its own"

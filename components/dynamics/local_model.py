@@ -22,8 +22,7 @@ from hapticlink.components.dynamics.closed_loop_solver import MatrixInertia
 from hapticlink.components.dynamics.light_bodies import added_inertia
 from hapticlink.components.dynamics.operational_space import Terms
 from hapticlink.components.dynamics.variables import parameters, start_parameters
-from hapticlink.components.linkage.closures import rows
-from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.model import LinkageModel, count_rows
 from hapticlink.components.specs.linkage import Linkage
 
 SYMBOLS = {"D": r"\widehat{D}", "W": r"\widehat{W}", "w": r"\widehat{w}", "J_h": r"\widehat{J}_h"}
@@ -33,7 +32,7 @@ SYMBOLS = {"D": r"\widehat{D}", "W": r"\widehat{W}", "w": r"\widehat{w}", "J_h":
 def ports(linkage: Linkage) -> list[Variable]:
     """The inputs D (n x n), W (m x n), w (m) and J_h (k x n); their start values are those of the
     assembled start pose."""
-    units, m = linkage.coordinate_units, sum(rows(linkage))
+    units, m = linkage.coordinate_units, count_rows(linkage)
     n = len(units)
     lengths = tuple("m" if unit == "rad" else "1" for unit in units)
     turning = tuple("1" if unit == "rad" else "1/m" for unit in units)

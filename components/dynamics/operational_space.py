@@ -17,7 +17,7 @@ import casadi as ca
 from hapticlink.components import forces
 from hapticlink.components.dynamics.articulated_body import TreeInertia
 from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, Inertia
-from hapticlink.components.linkage.closures import rows
+from hapticlink.components.dynamics.redundant_closures import least_pivot
 from hapticlink.components.linkage.model import LinkageModel
 
 
@@ -45,7 +45,8 @@ class OperationalSpace:
     def __init__(self, model: LinkageModel, terms: Terms | None = None) -> None:
         self.model = model
         self.terms = own_terms(model) if terms is None else terms
-        self.solver = ClosedLoopSolver(self.terms.inertia, self.terms.W, rows(model.linkage))
+        pivot = least_pivot(model.linkage)
+        self.solver = ClosedLoopSolver(self.terms.inertia, self.terms.W, model.rows, pivot=pivot)
 
     def mobility(self, J: ca.SX) -> ca.SX:
         """The mobility J D^-1 (J' - W' (W D^-1 W')^-1 W D^-1 J') of points with Jacobian J (k x n),

@@ -15,9 +15,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.dynamics.articulated_body import TreeInertia
-from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver
-from hapticlink.components.linkage.closures import rows
+from hapticlink.components.dynamics.closed_loop_solver import ClosedLoopSolver, Inertia
 from hapticlink.components.linkage.model import LinkageModel
 
 REPEATS = 3  # for the pose
@@ -25,14 +23,14 @@ RATE_REPEATS = 2
 MU = 1e-6  # as in closed_loop_solver.py
 
 
-def projection(model: LinkageModel, inertia: TreeInertia) -> ca.Function:
+def projection(model: LinkageModel, inertia: Inertia) -> ca.Function:
     """The function (q, qd, p) -> (q, qd) that projects onto h(q) = 0 and W(q) qd = 0; the identity
-    for a linkage without loops. inertia: the model's own."""
+    for a linkage without loops. inertia: the model's own, or another metric."""
     p, closed, rate = model.p.vector, model.q, model.qd
     if model.linkage.closed:
         h = ca.Function("h", [model.q, p], [model.h])
         W = ca.Function("W", [model.q, p], [model.W])
-        solver = ClosedLoopSolver(inertia, model.W, rows(model.linkage), MU)
+        solver = ClosedLoopSolver(inertia, model.W, model.rows, MU)
         for _ in range(REPEATS):
             closed = closed - solver.constrain(h(closed, p))
         W_closed = W(closed, p)

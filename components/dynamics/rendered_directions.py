@@ -1,4 +1,4 @@
-"""The directions of a port in which a device moves and gives force: all three of the plane, or
+"""The directions of a port in which a device moves and gives force: all of them, or, in the plane,
 fewer where it has fewer motors.
 
 E, (k, 3), selects them, y = E x. With Lambda^-1 the mobility at the operational point, split into
@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.device import Handle
 
 if TYPE_CHECKING:  # what is printed of a run needs no equations
@@ -38,10 +38,11 @@ LEAST = 1e-12
 
 @dataclass(frozen=True)
 class RenderedDirections:
-    """E by its rows, and whether the device holds the angle."""
+    """E by its rows, whether the device holds the angle, and the space of the port."""
 
     rows: tuple[tuple[float, ...], ...]
     is_angle_fixed: bool = False
+    space: PortSpace = PLANE
 
     @property
     def size(self) -> int:
@@ -51,12 +52,16 @@ class RenderedDirections:
     @property
     def whole(self) -> bool:
         """Whether all directions of the port are rendered."""
-        return self.size == PLANE.size
+        return self.size == self.space.size
 
     @property
     def has_moments(self) -> bool:
         """Whether moments are rendered."""
-        return any(row[THETA] for row in self.rows)
+        return any(
+            entry and turns
+            for r in self.rows
+            for entry, turns in zip(r, self.space.turns, strict=True)
+        )
 
     @property
     def compared(self) -> NDArray[np.float64]:
@@ -64,7 +69,8 @@ class RenderedDirections:
         angle that the device holds."""
         E = np.array(self.rows)
         common: NDArray[np.float64] = E.T @ E
-        common[THETA, THETA] += self.is_angle_fixed
+        if self.is_angle_fixed:
+            common[THETA, THETA] = 1.0
         return common
 
     @cached_property
@@ -143,13 +149,17 @@ class RenderedDirections:
         return R @ Lambda_inv @ R.T
 
 
-WHOLE = RenderedDirections(tuple(map(tuple, np.eye(PLANE.size).tolist())))
+def _whole(space: PortSpace) -> RenderedDirections:
+    return RenderedDirections(tuple(map(tuple, np.eye(space.size).tolist())), space=space)
 
 
-def rendered_directions(handle: Handle | None) -> RenderedDirections:
+WHOLE = _whole(PLANE)
+
+
+def rendered_directions(handle: Handle | None, space: PortSpace = PLANE) -> RenderedDirections:
     """Those of a device's handle; None stands for a handle that is held."""
     if handle is None or handle.angle == "held":
-        return WHOLE
+        return _whole(space)
     if handle.along is not None:
         length = math.hypot(*handle.along)
         x, y = (entry / length for entry in handle.along)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from hapticlink.components import forces
 from hapticlink.components.component import Variable
-from hapticlink.components.linkage.closures import gear_parameters, rows
+from hapticlink.components.linkage.closures import gear_parameters
+from hapticlink.components.linkage.model import count_rows
 from hapticlink.components.linkage.parameters import body_parameters, mean_link_length
 from hapticlink.components.port_space import PortSpace
 from hapticlink.components.schematic_parts import BlockPart
@@ -67,7 +68,7 @@ def states(linkage: Linkage) -> list[Variable]:
 
 
 def motion_outputs(linkage: Linkage) -> list[Variable]:
-    units, m, space = linkage.coordinate_units, sum(rows(linkage)), linkage.space
+    units, m, space = linkage.coordinate_units, count_rows(linkage), linkage.space
     changes = tuple(f"{u}/s2" for u in units)
     n, velocity = (len(units),), "velocity of the operational point"
     bias, accelerations = "operational acceleration at zero wrench", "joint accelerations"

@@ -16,14 +16,15 @@ if TYPE_CHECKING:
 def parameters(linkage: Linkage) -> list[Variable]:
     if linkage.gravity is None:
         return []
-    return [Variable("gravity", (2,), "m/s2", linkage.gravity, "acceleration of gravity")]
+    g = linkage.gravity
+    return [Variable("gravity", (len(g),), "m/s2", g, "acceleration of gravity")]
 
 
 def energy(model: LinkageModel) -> ca.SX | None:
     if model.linkage.gravity is None:
         return None
     weights = (
-        model.p[f"{b.name}.mass"] * ca.dot(model.p["gravity"], model.centers[b.name])
+        model.p[f"{b.name}.mass"] * ca.dot(model.lifted(model.p["gravity"]), model.centers[b.name])
         for b in model.linkage.body
     )
     return -sum(weights, start=ca.SX(0))

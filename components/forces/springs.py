@@ -30,7 +30,8 @@ def parameters(linkage: Linkage) -> list[Variable]:
         name = _name(linkage, i)
         for k, (body, point) in enumerate(zip(s.bodies, s.at, strict=True)):
             text = f"{name} on {body}"
-            variables.append(Variable(f"{name}.at{k + 1}", (2,), "m", point, text, "fixed"))
+            at = f"{name}.at{k + 1}"
+            variables.append(Variable(at, (len(point),), "m", point, text, "fixed"))
         for field, unit, value in (
             ("stiffness", "N/m", s.stiffness),
             ("damping", "N.s/m", s.damping),
@@ -44,7 +45,7 @@ def parameters(linkage: Linkage) -> list[Variable]:
 def _span(model: LinkageModel, index: int) -> ca.SX:
     name = _name(model.linkage, index)
     ends = [
-        model.frames[body].point(model.p[f"{name}.at{k + 1}"])
+        model.at(body, f"{name}.at{k + 1}")
         for k, body in enumerate(model.linkage.spring[index].bodies)
     ]
     return ends[0] - ends[1]

@@ -40,14 +40,14 @@ class JointCoordinate:
         first, second = (model.frames[body] for body in loop.bodies)
         if loop.kind.freedom.turns:
             return first.angle - second.angle
-        axis, ends = model.p[f"{self.name}.axis"], [model.p[f"{self.name}.at{k}"] for k in (1, 2)]
-        along = second.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
-        return ca.dot(along, first.point(ends[0]) - second.point(ends[1]))
+        along = second.rotation @ model.along(self.name, loop.axis)
+        ends = [model.at(body, f"{self.name}.at{k}") for k, body in enumerate(loop.bodies, 1)]
+        return ca.dot(along, ends[0] - ends[1])
 
 
 def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
     """The joints, then the cut joints, that have one of the keys. Raises ValueError for a
-    joint of several coordinates that has."""
+    joint of several coordinates that has, and for a cut joint in space."""
     coordinates = []
     for j in linkage.joint:
         given = [key for key in keys if getattr(j, key) is not None]
@@ -60,5 +60,10 @@ def joints_with(linkage: Linkage, *keys: str) -> list[JointCoordinate]:
             coordinates.append(JointCoordinate(j.name, j))
     for i, loop in enumerate(linkage.loop):
         if any(getattr(loop, key) is not None for key in keys):
+            if linkage.dimension > 2:
+                raise ValueError(
+                    f"loop `{loop_name(linkage, i)}`: {', '.join(keys)} act on joints of the tree "
+                    "in space; cut the loop at another joint"
+                )
             coordinates.append(JointCoordinate(loop_name(linkage, i), loop, i))
     return coordinates

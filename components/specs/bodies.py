@@ -5,8 +5,27 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from hapticlink.components.specs.quantities import Length, Mass, MomentOfInertia, Point
+import numpy as np
+from numpy.typing import NDArray
 
+from hapticlink.components.specs.quantities import (
+    Length,
+    Mass,
+    MomentOfInertia,
+    Place,
+    Point,
+    ProductOfInertia,
+)
+
+Moments = tuple[MomentOfInertia, MomentOfInertia, MomentOfInertia]
+Inertias = tuple[
+    MomentOfInertia,
+    MomentOfInertia,
+    MomentOfInertia,
+    ProductOfInertia,
+    ProductOfInertia,
+    ProductOfInertia,
+]
 SAME = 1e-9
 """The distance (m) up to which a centre of mass is that of a shape."""
 
@@ -20,10 +39,12 @@ class Body:
     """Its name in joints, loops and points; not "ground"."""
     mass: Mass
     """Mass; may be 0 for a body in a loop that cannot move without other masses."""
-    inertia: MomentOfInertia = None  # type: ignore[assignment]  # of a uniform shape
+    inertia: MomentOfInertia | Moments | Inertias = None  # type: ignore[assignment]  # of a shape
     """Moment of inertia about the centre of mass; by default that of its shape with uniform
-    density, whose centroid is then the centre of mass."""
-    center: Point | None = None
+    density, whose centroid is then the centre of mass. In space I_xx, I_yy, I_zz along the axes of
+    the body's frame, and after these the entries I_xy, I_xz, I_yz of the tensor where they are not
+    0; a single number holds about every axis."""
+    center: Place | None = None
     """Centre of mass in the body's frame; by default its origin."""
     radius: Length | None = None
     """Radius of the body's shape; without one, and without corners, it touches nothing."""
@@ -37,6 +58,8 @@ class Body:
             return
         if not self.shape:
             raise ValueError(f"body {self.name!r} has no shape: give its `inertia`")
+        if self.center is not None and len(self.center) > 2:
+            raise ValueError(f"body {self.name!r} has a shape of the plane: give its `inertia`")
         try:
             center, per_mass = uniform(self.shape, self.radius or 0.0)
         except OverflowError:
@@ -50,6 +73,24 @@ class Body:
         object.__setattr__(self, "inertia", self.mass * per_mass)
         if center != (0.0, 0.0):
             object.__setattr__(self, "center", center)
+
+    @property
+    def inertia_tensor(self) -> NDArray[np.float64]:
+        """Of the body in its own axes, (3, 3), kg.m2."""
+        if not isinstance(self.inertia, tuple):
+            return self.inertia * np.eye(3)
+        tensor = np.diag(self.inertia[:3])
+        for (i, j), entry in zip(((0, 1), (0, 2), (1, 2)), self.inertia[3:], strict=False):
+            tensor[i, j] = tensor[j, i] = entry
+        return tensor
+
+    @property
+    def moments(self) -> tuple[float, ...]:
+        """Its principal moments of inertia, the smallest first; one where a single number holds
+        about every axis and in the plane."""
+        if not isinstance(self.inertia, tuple):
+            return (self.inertia,)
+        return tuple(np.linalg.eigvalsh(self.inertia_tensor).tolist())
 
     @property
     def shape(self) -> tuple[Point, ...]:

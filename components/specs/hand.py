@@ -126,4 +126,6 @@ class FingertipHand:
     that at the end of its step."""
 
 
-Hand = ConstantHand | ProfileHand | ArmHand | SpringHand | FingertipHand
+HoldingHand = ArmHand | SpringHand | FingertipHand
+"""Hands with a stiffness, which a target moves."""
+Hand = ConstantHand | ProfileHand | HoldingHand

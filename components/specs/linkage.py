@@ -8,12 +8,12 @@ FMU. SI units throughout.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
 
 from hapticlink.components.integrators import METHODS
-from hapticlink.components.port_space import PLANE, PortSpace
+from hapticlink.components.port_space import PLANE, POINT, PortSpace
 from hapticlink.components.specs.bodies import Body
 from hapticlink.components.specs.drives import Drive
 from hapticlink.components.specs.joint_types import (
@@ -27,12 +27,13 @@ from hapticlink.components.specs.quantities import (
     Angle,
     Coordinate,
     Damping,
+    Direction,
     JointDamping,
     JointStiffness,
     Length,
     LinearDamping,
     LinearStiffness,
-    Point,
+    Place,
     Pose,
     Quantity,
     Stiffness,
@@ -43,6 +44,11 @@ Acceleration = Annotated[float, Quantity("m/s2")]
 Velocity = Annotated[float, Quantity("rad/s or m/s")]
 LinearVelocity = Annotated[float, Quantity("m/s")]
 Twist = tuple[LinearVelocity, LinearVelocity, Annotated[float, Quantity("rad/s")]]
+Two = tuple[Coordinate, Coordinate]
+Six = tuple[Coordinate, Coordinate, Coordinate, Coordinate, Coordinate, Coordinate]
+TwoRates = tuple[Velocity, Velocity]
+SixRates = tuple[Velocity, Velocity, Velocity, Velocity, Velocity, Velocity]
+Start = Coordinate | Pose | Two | Six
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +57,7 @@ class Spring:
 
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
-    at: tuple[Point, Point]
+    at: tuple[Place, Place]
     """The two points, each in the frame of its body."""
     stiffness: LinearStiffness | None = None
     """Stiffness; by default there is no spring."""
@@ -94,17 +100,22 @@ class Joint:
     """Its name in start values."""
     type: TreeType = "revolute"
     """revolute: one angle; prismatic: one displacement along `axis`; free: x, y and theta of the
-    child in the parent's frame."""
+    child in the parent's frame. [In space](space.md): universal, spherical, cylindrical and
+    floating."""
     parent: str = "ground"
     """The body that carries the joint."""
     child: str
     """The body that the joint carries."""
-    at_parent: Point | None = None
+    at_parent: Place | None = None
     """Position of the joint in the parent's frame; by default its origin."""
-    at_child: Point | None = None
+    at_child: Place | None = None
     """Position of the joint in the child's frame; by default its origin."""
-    axis: Angle | None = None
-    """Direction of a prismatic joint in the parent's frame, from its x axis; required there."""
+    axis: Angle | Direction | None = None
+    """Direction of a prismatic joint in the parent's frame, from its x axis; required there. In
+    space the axis of a joint that turns or slides, three numbers in the parent's frame; by default
+    its z axis."""
+    second_axis: Direction | None = None
+    """Second axis of a universal joint, in the child's frame; required there."""
     stiffness: JointStiffness | None = None
     """Stiffness of a spring about `rest`."""
     rest: Coordinate | None = None
@@ -133,11 +144,15 @@ class Joint:
         return JOINT_TYPES[self.type]
 
     def direction(self, freedom: Freedom) -> tuple[float, float]:
-        """Of a slide of the joint, in the parent's frame: a unit vector."""
+        """Of a slide of the joint in the plane, in the parent's frame: a unit vector."""
         if isinstance(freedom.along, tuple):
-            return freedom.along
-        axis = self.axis or 0.0
-        return math.cos(axis), math.sin(axis)
+            return freedom.along[0], freedom.along[1]
+        return math.cos(self.axis_angle), math.sin(self.axis_angle)
+
+    @property
+    def axis_angle(self) -> float:
+        """The `axis` of a joint in the plane, from the x axis (rad)."""
+        return 0.0 if self.axis is None or isinstance(self.axis, tuple) else self.axis
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,14 +162,20 @@ class Loop:
     type: CutType = "revolute"
     """revolute: the two points coincide; slot: the first body's point, a pin, is on the line
     through the second body's point along `axis`; prismatic: a slot in which the first body does
-    not turn relative to the second."""
+    not turn relative to the second. [In space](space.md): universal, spherical, cylindrical and
+    rod, which holds the distance of the points."""
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
-    at: tuple[Point, Point]
+    at: tuple[Place, Place]
     """The two points, each in the frame of its body."""
     axis: Angle | None = None
     """Direction of a slot or prismatic joint in the second body's frame, from its x axis; required
     there."""
+    axes: tuple[Direction, Direction] | None = None
+    """In space: the axes of the joint, in the first body's frame and in that of the second; by
+    default their z axes. Those of a universal joint are square, all others parallel."""
+    length: Length | None = None
+    """Distance of the two points that a rod holds; required there."""
     angle: Angle | None = None
     """Angle of the first body from the second in a prismatic joint; by default 0."""
     name: str | None = None
@@ -208,7 +229,7 @@ class OperationalPoint:
 
     body: str
     """The body that it belongs to."""
-    at: Point | None = None
+    at: Place | None = None
     """Its position in the body's frame; by default its origin."""
 
 
@@ -244,12 +265,16 @@ class Linkage:
     force: tuple[Any, ...] = ()
     """Forces of your own: `type` is a name that a plugin has registered, which defines the other
     keys ([extending](extending.md#a-force))."""
-    gravity: tuple[Acceleration, Acceleration] | None = None
-    """Gravity on every body."""
-    start: Mapping[str, Coordinate | Pose] = field(default_factory=dict)
-    """Joint coordinates at t = 0 by the joint's name, by default 0; three for a free joint.
-    Assembly changes them so that the loops close."""
-    start_velocity: Mapping[str, Velocity | Twist] = field(default_factory=dict)
+    gravity: (
+        tuple[Acceleration, Acceleration] | tuple[Acceleration, Acceleration, Acceleration] | None
+    ) = None
+    """Gravity on every body; three numbers in space."""
+    start: Mapping[str, Start] = field(default_factory=dict)
+    """Joint coordinates at t = 0 by the joint's name, by default 0; as many as the joint has, three
+    for a free joint. Assembly changes them so that the loops close."""
+    start_velocity: Mapping[str, Velocity | Twist | TwoRates | SixRates] = field(
+        default_factory=dict
+    )
     """Joint velocities at t = 0 by the joint's name; three for a free joint. Given ones are kept;
     the others are the smallest that are consistent with the loops."""
 
@@ -272,9 +297,41 @@ class Linkage:
         return point if isinstance(point, str) and self.choices else "operational_point"
 
     @property
+    def spatial(self) -> str:
+        """What makes it one in space: a type of joint, or a vector of more numbers than two; "" in
+        the plane."""
+        for j in self._joints:
+            if not j.kind.in_plane:
+                return f"a {j.type} joint"
+        points = [*self.points.values(), *self.point]
+        if not isinstance(self.operational_point, str):
+            points.append(self.operational_point)
+        vectors: dict[str, Iterable[object]] = {
+            "at_parent": (j.at_parent for j in self.joint),
+            "at_child": (j.at_child for j in self.joint),
+            "axis": (j.axis for j in self.joint),
+            "second_axis": (j.second_axis for j in self.joint),
+            "axes": (axis for loop in self.loop for axis in loop.axes or ()),
+            "at": (at for ends in (self.loop, self.spring) for one in ends for at in one.at),
+            "center": (body.center for body in self.body),
+            "inertia": (body.inertia for body in self.body),
+            "at of a point": (point.at for point in points),
+            "gravity": (self.gravity,),
+        }
+        for name, values in vectors.items():
+            if any(isinstance(value, tuple) and len(value) > 2 for value in values):
+                return f"three numbers of {name}"
+        return ""
+
+    @property
+    def dimension(self) -> int:
+        """2 in the plane, 3 in space."""
+        return 3 if self.spatial else 2
+
+    @property
     def space(self) -> PortSpace:
         """That of the ports at its operational points."""
-        return PLANE
+        return PLANE if self.dimension == 2 else POINT
 
     @property
     def coordinate_units(self) -> tuple[str, ...]:

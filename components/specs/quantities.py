@@ -64,6 +64,7 @@ Angle = Annotated[float, Quantity("rad")]
 Coordinate = Annotated[float, Quantity("rad or m")]
 Mass = Annotated[float, Quantity("kg", ge=0)]
 MomentOfInertia = Annotated[float, Quantity("kg.m2", ge=0)]
+ProductOfInertia = Annotated[float, Quantity("kg.m2")]
 Force = Annotated[float, Quantity("N")]
 Torque = Annotated[float, Quantity("N.m")]
 Effort = Annotated[float, Quantity("N.m or N")]
@@ -77,6 +78,11 @@ Substeps = Annotated[int, Quantity("1", ge=1, le=1000)]
 Seed = Annotated[int, Quantity("1", ge=0, le=2**63 - 1)]
 
 Point = tuple[Position, Position]
+PointInSpace = tuple[Position, Position, Position]
+Place = Point | PointInSpace
+"""Of a body, in the plane or in space; without a third number it is in the plane z = 0."""
+_Entry = Annotated[float, Quantity("1")]
+Direction = tuple[_Entry, _Entry, _Entry]
 Pose = tuple[Position, Position, Angle]
 Wrench = tuple[Force, Force, Torque]
 Stiffness = tuple[LinearStiffness, LinearStiffness, AngularStiffness]
@@ -86,3 +92,8 @@ Inertia = tuple[
     Annotated[float, Quantity("kg", gt=0)],
     Annotated[float, Quantity("kg.m2", gt=0)],
 ]
+
+
+def in_plane(place: Place | None) -> Point:
+    """A point of a planar linkage, by default the origin."""
+    return (0.0, 0.0) if place is None else (place[0], place[1])

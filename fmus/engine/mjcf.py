@@ -20,7 +20,7 @@ from hapticlink.components.contact.broad_phase import near
 from hapticlink.components.specs.bodies import Body, counterclockwise, edges
 from hapticlink.components.specs.contacts import Contacts, Pair
 from hapticlink.components.specs.linkage import Gear, Joint, Linkage, Loop, Spring
-from hapticlink.components.specs.quantities import Point
+from hapticlink.components.specs.quantities import Place, Point, in_plane
 from hapticlink.fmus.errors import FmuError
 
 HEIGHT = 0.05
@@ -82,7 +82,7 @@ def mjcf(
     return ET.tostring(root, encoding="unicode")
 
 
-def points(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
+def points(linkage: Linkage) -> Iterator[tuple[str, str, Place | None]]:
     """Name, body and position of each operational point."""
     hand = linkage.held
     yield HAND, hand.body, hand.at
@@ -125,6 +125,8 @@ def _names(joint: Joint) -> list[str]:
 def _misfits(linkage: Linkage) -> Iterator[str]:
     """What this model does not hold, each with the remedy."""
     ours = "leave the block to hapticlink"
+    if linkage.dimension > 2:
+        yield f"a linkage in space is not passed on: {ours}"
     if linkage.driven:
         yield f"drives of joints are not passed on: {ours}"
     if linkage.force:
@@ -150,8 +152,8 @@ def _misfits(linkage: Linkage) -> Iterator[str]:
             yield f"body {body.name!r} is a rounded polygon: leave out its radius or its corners"
 
 
-def _xy(point: tuple[float, float] | None) -> str:
-    x, y = point or (0.0, 0.0)
+def _xy(point: Place | None) -> str:
+    x, y = in_plane(point)
     return f"{x!r} {y!r} 0"
 
 
@@ -164,7 +166,7 @@ def _bodies(parent: ET.Element, name: str, linkage: Linkage, shapes: _Shapes) ->
         if joint.parent != name:
             continue
         body = next(b for b in linkage.body if b.name == joint.child)
-        a, c = joint.at_parent or (0.0, 0.0), joint.at_child or (0.0, 0.0)
+        a, c = in_plane(joint.at_parent), in_plane(joint.at_child)
         element = ET.SubElement(parent, "body", name=body.name, pos=_xy((a[0] - c[0], a[1] - c[1])))
         inertia = " ".join([repr(body.inertia)] * 3)
         ET.SubElement(
@@ -175,7 +177,7 @@ def _bodies(parent: ET.Element, name: str, linkage: Linkage, shapes: _Shapes) ->
         _bodies(element, body.name, linkage, shapes)
 
 
-def _sites(linkage: Linkage) -> Iterator[tuple[str, str, Point | None]]:
+def _sites(linkage: Linkage) -> Iterator[tuple[str, str, Place | None]]:
     yield from points(linkage)
     tied: dict[str, Sequence[Loop | Spring]] = {"loop": linkage.loop, "spring": linkage.spring}
     for kind, pairs in tied.items():

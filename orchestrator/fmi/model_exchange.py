@@ -31,7 +31,6 @@ from hapticlink.orchestrator.fmi.event_mode import WithEvents, is_continuous
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
-from hapticlink.orchestrator.fmi.transfer import Transfer
 from hapticlink.orchestrator.fmi.variables import TYPES, Scalar
 
 LONGEST = 1 / 50
@@ -242,44 +241,43 @@ class ModelExchange(WithEvents):
 
     def serialized(self) -> bytes:
         """Where the description has a layout of it (`Description.states`), that of an FMU of this
-        project: the values of all variables by reference, and then the continuous states."""
+        project: the values of all variables by reference, of which inputs and outputs alone are
+        read, and then the continuous states."""
         if self.description.states is None:
             return super().serialized()
-        values, reads, order = self._layout
-        self._carry_out(reads, "gets")
-        x = np.zeros(self._x_size)
+        ports = self._ports("input", "output")
+        read = np.zeros(len(ports))
+        self._carry_out(self._transfers("Get", ports, read), "gets")
+        values, x = np.zeros(len(self._place)), np.zeros(self._x_size)
+        values[[self._place[s.name] for s in ports]] = read
         if len(x):
             self._fmi("GetContinuousStates", _pointer(x), len(x))
-        return np.concatenate([values[order], x]).tobytes()
+        return np.concatenate([values, x]).tobytes()
 
     def deserialize(self, state: bytes) -> None:
         self._begins, self._newest, self._of_fmu = True, None, 0.0
         if self.description.states is None:
             super().deserialize(state)
             return
-        values, x = np.split(np.frombuffer(state).copy(), [len(self._by_reference)])
+        values, x = np.split(np.frombuffer(state).copy(), [len(self._place)])
         if self._x_size:
             self._fmi("SetContinuousStates", _pointer(x), len(x))
-        scalars = self._by_reference
-        inputs = [i for i, s in enumerate(scalars) if is_continuous(s)]
-        *_, sets = self._setting([scalars[i] for i in inputs])
-        for transfer in sets:  # all of one type
-            transfer.values[:] = values[inputs]
+        inputs = [s for s in self._ports("input") if is_continuous(s)]
+        whole, into, sets = self._setting(inputs)
+        whole[slice(None) if into is None else into] = values[[self._place[s.name] for s in inputs]]
         self._carry_out(sets, "sets")
 
     @cached_property
-    def _by_reference(self) -> list[Scalar]:
+    def _place(self) -> dict[str, int]:
+        """By name of a variable, its place by reference."""
         scalars = [s for s in self.description.scalars if s.causality != "independent"]
-        return sorted(scalars, key=lambda s: s.reference)
+        return {s.name: i for i, s in enumerate(sorted(scalars, key=lambda s: s.reference))}
 
-    @cached_property
-    def _layout(self) -> tuple[Vector, list[Transfer], list[int]]:
-        """The values of all variables by type, what reads them, and their order by reference."""
-        by_type = sorted(self._by_reference, key=lambda s: TYPES.index(s.type))
-        values = np.zeros(len(by_type))
-        place = {s.name: i for i, s in enumerate(by_type)}
-        order = [place[s.name] for s in self._by_reference]
-        return values, self._transfers("Get", by_type, values), order
+    def _ports(self, *causalities: str) -> list[Scalar]:
+        """Variables by type, without clocks."""
+        every = (s for s in self.description.scalars if s.type != "Clock")
+        ports = [s for s in every if s.causality in causalities]
+        return sorted(ports, key=lambda s: TYPES.index(s.type))
 
     def close(self) -> FmuFault | None:
         try:

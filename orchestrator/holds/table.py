@@ -47,6 +47,7 @@ TABLE: dict[str, HoldRow] = {
     "latest": HoldRow("samples", "zero_order", gives_samples=True, downsamples=True),
     "mean": HoldRow("mean", "mean", remembers=3, downsamples=True),
     "half-lead": HoldRow("mean", "half_lead", remembers=3, downsamples=True),
+    "reaction": HoldRow("reaction", "reaction", remembers=15, needs="reaction"),
     "mid": HoldRow("mid", "mid", remembers=1, needs="coupling", downsamples=True),
 }
 """By the name in a scene, which tells what a hold is: docs/holds.md."""

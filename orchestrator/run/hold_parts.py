@@ -97,7 +97,11 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
     of = spring(connection, system.energy.springs) if kind.needs == "spring" else None
     kept = None if kind.gives_samples else connection.kind
     matrix = kept if kept in ("projector", "semidefinite") else None
-    further = ports.companion_outputs(connection, system.fmu)
+    companions = ports.companion_outputs(connection, system.fmu)
+    further = [signals.scalar(connection.source, s.name) for s in companions]
+    if kind.needs == "reaction":  # pose and velocity of the near end
+        ends = read_beside(connection, system)
+        further = [i for k in (1, 3) for i in signals.sources(ends[k].of)]
     return HoldParts(
         name=connection.hold,
         kind=kind,
@@ -106,7 +110,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
             len(connection.inputs), system.timeline.seconds, displacement, velocity
         ),
         base=system.timeline.base,
-        further=tuple(signals.scalar(connection.source, s.name) for s in further),
+        further=tuple(further),
         turns={} if matrix else _turns(connection, system),
         matrix=matrix,
         latency=connection.latency,

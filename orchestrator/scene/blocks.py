@@ -137,6 +137,8 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
             settings["clutch"] = True
         if user in partial:
             settings["handle"] = partial[user]
+        if scene.linkage and scene.linkage.dimension > 2:
+            settings["space"] = "point"
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
     devices = {user: replace(d, driver=None) for user, d in scene.all_devices.items()}
     beside = {user: devices[user] for user in observed_beside(scene)}

@@ -21,7 +21,7 @@ from hapticlink.orchestrator.scene.types_of_keys import (
     types_at,
 )
 
-_COUNTS = ("no", "one", "two", "three", "four")
+_COUNTS = ("no", "one", "two", "three", "four", "five", "six")
 
 
 def vector(path: Path, data: Any) -> str:

@@ -135,7 +135,13 @@ def _with_springs(
                 f"{c.source}.{c.source_port} is no force of a spring-damper both ends of which are "
                 "connected and move with a known mobility (docs/holds.md); take 'half-lead'"
             )
-        elif c.needs == "coupling" and c.latency:
+        elif c.needs == "reaction" and energy.coupling_beside(c, connections) is None:
+            reason = (
+                f"beside {c.target}.{c.target_port} acts no force of a spring-damper both ends of "
+                "which are connected and move with a known mobility (docs/holds.md); take "
+                "'half-lead'"
+            )
+        elif c.needs in ("coupling", "reaction") and c.latency:
             reason = springs.NEVER_LATE
         if c.hold and reason:
             key = next((k for k in names(c) if k in holds), None)

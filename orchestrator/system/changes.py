@@ -83,9 +83,9 @@ def check_change(
     on_force = on_force and any(d.needs == "spring" for d in system.connections)
     if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"
-    if delay and new.needs == "coupling":
+    if delay and new.needs in ("coupling", "reaction"):
         why = springs.NEVER_LATE
-    if c.hold != new.hold and {"step", "coupling"} & {c.needs, new.needs}:
+    if c.hold != new.hold and {"step", "coupling", "reaction"} & {c.needs, new.needs}:
         why = "when its samples are taken is planned before the start: take `reset`"
     if why:
         raise InputFault(f"hold of {c.name} = {new.hold}: {why}")

@@ -3,8 +3,8 @@
 The inputs of a plant are held over its step, so that its step is determined when it begins. `model`
 stands for what is known of a connection: from a source that gives gradients, `model` itself; from a
 slower plant, whose steps are then taken early, `ahead`; to such a plant, `mid` for the force of a
-coupling both ends of which move with a known mobility, `half-lead` for other efforts, and `latest`
-for anything else.
+coupling both ends of which move with a known mobility, `reaction` for an effort beside it,
+`half-lead` for other efforts, and `latest` for anything else.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.ports import carries_power, names
 from hapticlink.orchestrator.system.system import Connection, EnergyPorts, Fmu
 
-MODEL = {"hold": ("model", "ahead"), "downsampling": ("mid", "half-lead")}
+MODEL = {"hold": ("model", "ahead"), "downsampling": ("mid", "reaction", "half-lead")}
 
 
 def stands_for(key: str, hold: str) -> tuple[str, ...]:
@@ -79,4 +79,6 @@ def towards(
     """What `model` is of a connection to a slower clock, whose samples may be late."""
     if c.target not in early or not carries_power(c, energy.power):
         return "latest"
-    return "half-lead" if late or energy.coupling(c, connections) is None else "mid"
+    if not late and energy.coupling(c, connections):
+        return "mid"
+    return "reaction" if not late and energy.coupling_beside(c, connections) else "half-lead"

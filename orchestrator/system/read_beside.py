@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.scene.scene_tables import SetSpring
 from hapticlink.orchestrator.system import ports
 from hapticlink.orchestrator.system.system import Connection, System
 
@@ -21,17 +22,25 @@ class Beside(NamedTuple):
 
 def read_beside(c: Connection, system: System) -> tuple[Beside, ...]:
     """What the hold of a connection reads beside its samples: the coordinates of a gradient; the
-    efforts on the FMU whose step is taken early; far and near end of a coupling, their rates,
-    and the mobility. Raises InputFault where coordinates are not fed by one connection as a whole.
+    efforts on the FMU whose step is taken early; far and near end of a coupling or of that beside,
+    their rates, and the mobility. Raises InputFault where coordinates are not fed by one connection
+    as a whole.
     """
     if c.needs == "gradient":
         return (Beside(_coordinates(c, system), held=False),)
     if c.needs == "step":
         return tuple(_efforts(c, system))
     if c.needs == "coupling" and (of := system.energy.coupling(c, system.connections)):
-        into = {f"{i.target}.{i.target_port}": i for i in system.into(c.source)}
-        return tuple(Beside(i, bool(i.hold)) for i in (into[end] for end in of.ends))
+        return _ends(of, system)
+    if c.needs == "reaction" and (of := system.energy.coupling_beside(c, system.connections)):
+        return _ends(of, system)
     return ()
+
+
+def _ends(of: SetSpring, system: System) -> tuple[Beside, ...]:
+    """Far and near end of a coupling, their rates, and the mobility."""
+    into = {f"{i.target}.{i.target_port}": i for i in system.connections}
+    return tuple(Beside(i, bool(i.hold)) for i in (into[end] for end in of.ends))
 
 
 def _coordinates(c: Connection, system: System) -> Connection:

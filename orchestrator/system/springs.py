@@ -14,7 +14,7 @@ from hapticlink.orchestrator.system.ports import size
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 NEVER_LATE = (
-    "'mid' has the force by what is known of both ends now, however late its samples are: take "
+    "'mid' and 'reaction' have the force by both ends of now, however late its samples are: take "
     "the latency out, or 'half-lead'"
 )
 

@@ -11,14 +11,14 @@ from hapticlink.components.blocks.start_settings import (
     start_pose,
     without_start_values,
 )
-from hapticlink.components.specs.linkage import Coordinate, Linkage, Pose
+from hapticlink.components.specs.linkage import Linkage, Start
 from hapticlink.orchestrator.base import plugins, shelf
 from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks
 
 if TYPE_CHECKING:
     from hapticlink.components.dynamics.start_poses import Choice, StartPoses
 
-Start = Mapping[str, Coordinate | Pose]
+Starts = Mapping[str, Start]
 
 
 def separate_start_values(planned: Blocks) -> Blocks:
@@ -44,11 +44,11 @@ class _KnownPoses:
     coordinates one for which FMUs are made. linkage: without its start."""
 
     linkage: Linkage
-    first: Start
-    made: dict[Choice, Start] = field(default_factory=dict)
+    first: Starts
+    made: dict[Choice, Starts] = field(default_factory=dict)
     poses: StartPoses | None = None
 
-    def find(self, start: Start) -> Start:
+    def find(self, start: Starts) -> Starts:
         """The pose whose FMUs have the equations of `start`; that itself where none has."""
         if repr(start) == repr(self.first):
             return self.first
@@ -61,7 +61,7 @@ class _KnownPoses:
             self._add(self.poses, self.first)
         return self._add(self.poses, start)
 
-    def _add(self, poses: StartPoses, start: Start) -> Start:
+    def _add(self, poses: StartPoses, start: Starts) -> Starts:
         choice = poses.choose(start)
         return start if choice is None else self.made.setdefault(choice, start)
 
@@ -69,7 +69,7 @@ class _KnownPoses:
 _KNOWN: shelf.Shelf[_KnownPoses] = shelf.Shelf(4)
 
 
-def _find_made(linkage: Linkage) -> Start:
+def _find_made(linkage: Linkage) -> Starts:
     """The start pose for which FMUs are made: that of a linkage before, of whose equations this
     process knows that they are the same."""
     if not shelf.is_keeping() or plugins.list_plugins():

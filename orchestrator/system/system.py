@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
@@ -158,6 +158,18 @@ class EnergyPorts:
         to = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
         sizes = [to.get(end) for end in own.ends]
         return own if sizes == [n, n, n, n, n * n] else None
+
+    def coupling_beside(
+        self, c: Connection, connections: Collection[Connection]
+    ) -> SetSpring | None:
+        """The spring-damper of `coupling` whose force moves what the effort of a connection does,
+        beside it."""
+        moved = {p.effort: p.displacement for p in self.power}
+        own = moved.get(f"{c.target}.{c.target_port}")
+        others = (k for k in connections if k.target == c.target and k.name != c.name)
+        same = (k for k in others if own and moved.get(f"{k.target}.{k.target_port}") == own)
+        found = (self.coupling(k, connections) for k in same)
+        return next((of for of in found if of), None)
 
 
 @dataclass(frozen=True)

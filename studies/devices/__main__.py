@@ -17,9 +17,7 @@ from studies.devices import measure, page
 def row(name: str) -> dict[str, Any]:
     """All that the page has of a device."""
     given = measure.options(name)
-    found = hl.stability(measure.SCENE, given, poses=1)
-    factors = measure.BESIDE if found.margin.stiffness else ()
-    checks = [measure.check(name, found, factor) for factor in factors]
+    judged = measure.judged(name)
     device = hl.scene(measure.SCENE, given).device
     assert device is not None
     errors = {}
@@ -30,9 +28,10 @@ def row(name: str) -> dict[str, Any]:
     return {
         "device": name,
         "renders": device.handle.angle,
-        "verdict": found.finding,
-        "margin": asdict(found.margin),
-        "checks": [asdict(check) | {"agrees": check.agrees} for check in checks],
+        "verdict": judged.says,
+        "worst": {"hand": judged.hand, "growth": judged.growth},
+        "margin": judged.margin,
+        "checks": [asdict(check) | {"agrees": check.agrees} for check in judged.checks],
         "rendered": asdict(measure.rendered(device)),
         "errors": errors,
     }

@@ -9,13 +9,14 @@ import casadi as ca
 import numpy as np
 
 import hapticlink as hl
+from hapticlink.analysis.search.search import largest_scale
 from hapticlink.analysis.search.settings import Gains
-from hapticlink.analysis.stability.hand_cases import InHands, worst_case
+from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
 from hapticlink.analysis.stability.hands import HANDS, standing
 from hapticlink.analysis.stability.modes import DRIFT
-from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, simulate_scene
 from hapticlink.analysis.stability.resting_scene import resting
-from hapticlink.analysis.stability.verdict_record import Stability
+from hapticlink.analysis.stability.short_hyperperiod import whole_frames
 from hapticlink.components.device.models import device_model
 from hapticlink.components.device.motors_and_encoders import mass_and_count
 from hapticlink.components.device.observer_laws import default_bandwidth
@@ -23,14 +24,15 @@ from hapticlink.components.device.workspace import workspace
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, Hand, SpringHand
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
-from hapticlink.orchestrator.system.build_system import build_system
 
 SCENE = "closed-loop-ideal"
 SECONDS, EARLY, LATE = 60.0, (0.25, 2.0), 5.0
-OFF = (2e-4, 0.0, 0.0)
+OFF = (1e-6, 0.0, 0.0)
 QUIET, MOST = 1e-7, 0.5
 BESIDE = (0.8, 1.25)
 """Factors on the margin, with which the verdicts are checked."""
+FINE = 0.05
+"""Of the margin's logarithm."""
 COUPLING = 100.0
 """K_pc (N/m) of the scene."""
 Options = dict[str, Any]
@@ -58,24 +60,39 @@ class Check:
         return self.says not in ("stable", "unstable") or self.says == self.run
 
 
-def scaled(name: str, factor: float) -> Options:
-    """The options with all gains times a factor, dampings by its root."""
-    with build_system(hl.scene(SCENE, options(name))) as system:
-        gains = Gains(system)
-        return options(name) | gains.options(dict.fromkeys(gains.laws, factor))
+@dataclass(frozen=True)
+class Judged:
+    """The verdict at the start pose in the worst of the hands of `stability`, the largest factor on
+    all gains, dampings by its root, up to which no hand is unstable there, and what checks it."""
+
+    says: str
+    hand: str
+    growth: float
+    margin: float
+    checks: tuple[Check, ...]
 
 
-def check(name: str, found: Stability, factor: float) -> Check:
-    """The verdict with gains of factor times the margin that was found, and its run."""
-    assert found.margin.stiffness
-    pose = next(pose for pose in found.poses if pose.name == found.worst.pose)
-    times = factor * found.margin.stiffness
-    with resting(hl.scene(SCENE, options(name)), pose.held, joints=pose.joints) as place:
-        scales = dict.fromkeys(Gains(place.map.system).laws, times)
-        cases = InHands(place, scales).cases(pose.name, dict(HANDS), DRIFT)
-    case = worst_case(cases)
-    ran = run_case(scaled(name, times), pose, HANDS[case.hand])
-    return Check(factor, case.verdict, case.hand, case.growth, ran)
+def judged(name: str) -> Judged:
+    """That of a device, with frames of whole haptic periods."""
+    read = whole_frames(hl.scene(SCENE, options(name)))
+    assert read.linkage is not None
+    pose = choose_evenly_spaced(simulate_scene(read), read.linkage, 1)[0]
+    with resting(read, pose.held, joints=pose.joints) as place:
+        gains = Gains(place.map.system)
+
+        def worst(factor: float) -> Case:
+            scales = dict.fromkeys(gains.laws, factor)
+            return worst_case(InHands(place, scales).cases(pose.name, dict(HANDS), DRIFT))
+
+        first = worst(1.0)
+        margin = largest_scale(lambda factor: worst(factor).verdict != "unstable", FINE).value
+        checks = []
+        for factor in BESIDE:
+            case = worst(factor * margin)
+            given = options(name) | gains.options(dict.fromkeys(gains.laws, factor * margin))
+            ran = run_case(given, pose, HANDS[case.hand])
+            checks.append(Check(factor, case.verdict, case.hand, float(case.growth), ran))
+    return Judged(first.verdict, first.hand, float(first.growth), float(margin), tuple(checks))
 
 
 def run_case(given: Options, there: Pose, holding: Hand) -> str:

@@ -20,7 +20,6 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
     study = "[what is judged and run](../../studies/devices/__init__.py)"
     numbers = (
         "largest stable stiffness of the coupling (N/m)",
-        "lowest graphics rate (Hz)",
         "mass at the handle in the workspace (kg)",
         "least force of the motors (N)",
         "way of a count (um)",
@@ -40,7 +39,7 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
         "## What a device can render",
         "",
         f"| device | renders | {' | '.join(numbers)} |",
-        "|---|---|--:|--:|--:|--:|--:|--:|--:|",
+        "|---|---|--:|--:|--:|--:|--:|--:|",
         *(_rendered(row) for row in rows),
         "",
         "The mass is that in the lightest direction anywhere to that in the heaviest, the least "
@@ -71,11 +70,10 @@ def _rendered(row: dict[str, Any]) -> str:
     found, margin = row["rendered"], row["margin"]
     low, high = found["mass"]
     renders = "forces and moments" if row["renders"] == "held" else "forces"
-    rate = margin["rate"]
     return (
-        f"| {row['device']} | {renders} | {short(COUPLING * margin['stiffness'])} | "
-        f"{'-' if rate is None else short(rate)} | {short(low)} to {short(high)} | "
-        f"{short(found['force'])} | {short(1e6 * found['count'])} | {short(found['omega_n'])} | "
+        f"| {row['device']} | {renders} | {short(COUPLING * margin)} | "
+        f"{short(low)} to {short(high)} | {short(found['force'])} | "
+        f"{short(1e6 * found['count'])} | {short(found['omega_n'])} | "
         f"{short(found['noise'])} |"
     )
 
@@ -87,9 +85,9 @@ def _error(row: dict[str, Any], sensing: str) -> str:
 
 
 def _check(row: dict[str, Any], check: dict[str, Any]) -> str:
-    verdict = row["verdict"].partition(":")[0]
+    verdict = row["verdict"]
     return (
-        f"| {row['device']} | {verdict} | {short(row['margin']['stiffness'])} | "
+        f"| {row['device']} | {verdict} | {short(row['margin'])} | "
         f"{check['factor']:g} | {check['says']} | {short(check['growth'])}, {check['hand']} | "
         f"{check['run']} |"
     )

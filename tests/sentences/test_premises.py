@@ -21,6 +21,7 @@ from hapticlink.analysis.stability.modes import Bounds
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.tune.tuning_result import Tuned
+from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.compare import page
 from hapticlink.visualization.figures import run_figures
 
@@ -179,6 +180,17 @@ def test_a_hand_that_is_led_takes_energy_out() -> None:
     pushed = hl.run("closed-loop-ideal", {"duration": 0.3}, figures=False)
     assert "energy at the user's port: the hand put in " in str(pushed)
     assert (describe_work(-2.0, "taken"), describe_work(2.0)) == ("taken out 2 mJ", "put in 2 mJ")
+
+
+def test_what_two_hands_put_in_is_not_said_of_one() -> None:
+    run = hl.run("two-users", {"duration": 0.2}, figures=False)
+    assert run.record.user_port
+    own, other = (run.record.user_port.works[name] for name in ("hand", "left: hand"))
+    assert own != 0.0 != other
+    (line,) = (line for line in str(run).split("\n") if "energy at the user's port" in line)
+    assert f": the hands together put in {short(1e3 * (own + other))} mJ" in line
+    legend = run_figures.figures(run)["user_port"].legends[0].get_texts()
+    assert "put in by the hands together" in [" ".join(t.get_text().split()) for t in legend]
 
 
 def test_runs_that_a_clock_drives_are_not_said_to_repeat() -> None:

@@ -213,7 +213,9 @@ $("listen").onclick = () => {
   $("hear").value = $("hear").value ? "" : "force";
   $("hear").onchange();
 };
-document.addEventListener("pointerdown", () => ending.hide(), true);
+// A press elsewhere than on the picture is over first: else what is pressed moves away from it, and is not clicked.
+document.addEventListener("pointerdown", ({ target }) => { if (target === stage.canvas) ending.hide(); }, true);
+document.addEventListener("click", () => ending.hide(), true);
 document.addEventListener("keydown", (event) => {
   if (!event.repeat) ending.hide();
   if (event.target.closest("input, select, button, summary")) return;

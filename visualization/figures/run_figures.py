@@ -6,7 +6,6 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import cycle, product
 from textwrap import fill
@@ -39,7 +38,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
@@ -54,7 +53,7 @@ from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
-from hapticlink.visualization.mechanism import drawing, marks
+from hapticlink.visualization.mechanism import drawing, marks, space_drawing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -86,20 +85,26 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if not results.last_time:
         return drawn_by
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
-    results = with_record(replace(results, tables=with_rows), results.record)
+    whole_run = Results(results.folder, results.run, with_rows)
+    results = with_record(whole_run, results.record)
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description
     linkage, devices = scene_part(results, "linkage", Linkage), described_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
-    if linkage and (table := of_block(results, JOINT_COORDINATES, size)):
+    planar = linkage and linkage.dimension == 2
+    if linkage and planar and (table := of_block(results, JOINT_COORDINATES, size)):
         q = table[JOINT_COORDINATES]
         finite = np.flatnonzero(np.isfinite(q).all(axis=1))
         if len(finite) and of_port(results, POINT_POSE):
             ends = q[finite[[0, -1]]]
             drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends, port)
     if of_port(results, POINT_POSE):
-        if "mechanism" not in drawn_by:
+        if linkage and not planar:
+            drawn_by["trajectories"] = partial(_places_in_time, results, linkage)
+            if table := of_block(results, JOINT_COORDINATES, size):
+                drawn_by["mechanism"] = partial(_in_space, results, linkage, table)
+        elif "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
         if of_port(results, find_handle(results)):
             drawn_by["distance"] = partial(_distance, results)
@@ -267,6 +272,38 @@ def _trajectories(results: Results) -> Figure:
     return figure
 
 
+def _in_space(results: Results, linkage: Linkage, table: Table) -> Figure:
+    """The linkage at the start and the end of the run, and the path of its operational point."""
+    (_, path), q = _path(results), table[JOINT_COORDINATES]
+    figure, axes = titled_axes(results, _reach_in_space(path), "", "")
+    finite = np.flatnonzero(np.isfinite(q).all(axis=1))
+    space_drawing.draw(axes, linkage, q[finite[0]], q[finite[-1]], path)
+    return figure
+
+
+def _path(results: Results) -> tuple[Vector, Vector]:
+    """Times (s) and places (m) of the operational point in space."""
+    table = of_port(results, POINT_POSE)
+    assert table is not None
+    return table["time"], table[POINT_POSE]
+
+
+def _reach_in_space(path: Vector) -> str:
+    reach = short(1e3 * float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0)))
+    return f"The operational point moves up to {reach} mm from its start"
+
+
+def _places_in_time(results: Results, linkage: Linkage) -> Figure:
+    """The operational point in space over time."""
+    times, path = _path(results)
+    figure, axes = titled_axes(results, _reach_in_space(path), "time (s)", "place (mm)")
+    time, drawn = curve(times, 1e3 * path)
+    for name, column, style in zip(linkage.space.names, drawn.T, cycle(STYLES)):
+        axes.plot(time, column, style, label=name)
+    axes.legend(fontsize="small")
+    return figure
+
+
 def _distance(results: Results) -> Figure:
     users = {u.name: curve(*pose_error(results, u)) for u in find_users(results)}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
@@ -335,18 +372,19 @@ def _source(block: str) -> str:
 def _port(results: Results, port: UserPort) -> Figure:
     measured = port.measured
     peak, at = measured.peak, int(np.argmax(port.generated_J))
+    whose = summary.name_hands(measured)
     title = f"The rendering {summary.describe_generated(peak, measured.generated)}"
     if peak > summary.ROUNDING_J:
         title = f"At most {short(1e3 * peak)} mJ generated, at {port.time_s[at]:.3g} s"
         if put_in := float(port.put_in_J[at]):
-            title += f", where the hand had {summary.describe_work(1e3 * put_in, 'taken')}"
+            title += f", where {whose} had {summary.describe_work(1e3 * put_in, 'taken')}"
     if peak > summary.ROUNDING_J and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name][at]))
         title += f"; largest source then: {_source(largest)}"
     label = "energy at the user's port (mJ)"
     figure, axes = titled_axes(results, title, "time (s)", label)
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
-    axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label="put in by the hand")
+    axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label=f"put in by {whose}")
     least = DRAWN * np.abs(port.generated_J).max()
     drawn = {name: e for name, e in port.blocks_J.items() if np.abs(e).max() > least}
     looks = product(("-", "-."), CURVES)

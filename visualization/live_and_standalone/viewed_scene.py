@@ -12,6 +12,7 @@ from hapticlink.orchestrator.base.signal_names import HAND, block_of_user
 from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.visualization.mechanism.picture import require_planar
 
 STIFFNESS, DAMPING = (100.0, 100.0, 0.0), (5.0, 5.0, 0.005)
 """Of the mouse's spring and damper to the handle, which leave its turn free but damped."""
@@ -22,13 +23,15 @@ DURATION = 600.0
 def load_viewed_scene(name: str, options: Options = (), duration: float = DURATION) -> Scene:
     """The scene with a spring hand for each user without a board that pulls nowhere yet, of
     compiled FMUs if the options say nothing else, and without its end at the border of the
-    workspace. Raises InputFault for a scene without a linkage, or one that has an FMU of the user's
-    in place of a hand."""
-    if open_scene.load(name, options).linkage is None:
+    workspace. Raises InputFault for a scene without a linkage in the plane, or one that has an FMU
+    of the user's in place of a hand."""
+    linkage = open_scene.load(name, options).linkage
+    if linkage is None:
         raise InputFault(
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
+    require_planar(linkage, name)
     read = open_scene.load(name, (*write_options({"packaging": "native"}), *write_options(options)))
     hands = [block_of_user(HAND, user) for user in ("", *read.devices)]
     if any(fmu.replaces in hands for fmu in read.fmu):

@@ -230,7 +230,7 @@ def _slides(linkage: Linkage) -> Iterator[Mark]:
         if joint.parent == "ground" and joint.kind.mark:
             yield Mark("ground", "ground", ends[1:], None, "#8c8c8c")
         if joint.kind.has_axis:
-            yield _rail(ends, joint.axis, beyond)
+            yield _rail(ends, joint.axis_angle, beyond)
     for loop in linkage.loop:
         pin, guide = (_on(b, at) for b, at in zip(loop.bodies, loop.at, strict=True))
         if "ground" in loop.bodies:
@@ -255,7 +255,7 @@ def _joints(linkage: Linkage) -> Iterator[Mark]:
     for joint in linkage.joint:
         ends = _on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent)
         if joint.kind.mark == "slider":  # turned like the line along which it slides
-            yield Mark("joint", "slider", ends, fill="#ffffff", angle=joint.axis or 0.0)
+            yield Mark("joint", "slider", ends, fill="#ffffff", angle=joint.axis_angle)
         elif joint.kind.mark:
             at = ends[0] if joint.kind.slides else ends[1]
             yield Mark("joint", joint.kind.mark, (at,), fill="#ffffff")

@@ -17,6 +17,7 @@ from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.visualization.mechanism.marks import marks, point_of, state
 
 PORT = "user's port"
@@ -24,6 +25,15 @@ RAW = ("ghost", "q", "lambda", "P_c", "measured")
 """What frames have instead of what is drawn."""
 LEAST_SHARE = 0.05
 """Of a constrained direction in the plane, below which it is a mere turn."""
+
+
+def require_planar(linkage: Linkage, name: str) -> None:
+    """Raises InputFault for a linkage in space, which no page and no replay draws."""
+    if linkage.dimension > 2:
+        raise InputFault(
+            f"{name}: its linkage is in space, and pages and replays draw the plane; the figures "
+            "of `hapticlink run` have it at the start and the end"
+        )
 
 
 class Part(NamedTuple):
@@ -128,14 +138,14 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
 def _cut_joint_forces(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
     """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
     what slides is along the normal, and a moment has no arrow."""
-    rows = sum(loop.kind.rows for loop in linkage.loop)
+    rows = sum(loop.kind.rows() for loop in linkage.loop)
     along, q = ca.SX.sym("lambda", rows), ca.SX.sym("q", poses.size1_in(0))
     angles, forces, row = poses(q)[2, :], [], 0
     for loop in linkage.loop:
         normal = angles[names.index(loop.bodies[1])] + (loop.axis or 0.0)
         force = along[row] * ca.vertcat(-ca.sin(normal), ca.cos(normal))
         forces.append(force if loop.kind.has_axis else along[row : row + 2])
-        row += loop.kind.rows
+        row += loop.kind.rows()
     made = ca.Function("cut", [along, q], [ca.horzcat(*forces)])
     return Part("", "cut", ("lambda", "q"), (rows, q.numel()), made)
 

@@ -25,7 +25,7 @@ from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_P
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization.mechanism.frame_signals import candidates
-from hapticlink.visualization.mechanism.picture import PORT, Picture
+from hapticlink.visualization.mechanism.picture import PORT, Picture, require_planar
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
@@ -50,6 +50,7 @@ class Recorded:
         if linkage is None:
             message = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
             raise InputFault(f"{folder}: the run has no [linkage]: {message}")
+        require_planar(linkage, folder)
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)

@@ -478,6 +478,9 @@ int account_has_room(const Account *a, int64_t samples);
 typedef int Push(Hold *h, const double *y, int64_t stamp, int64_t arrival);
 typedef int Value(Hold *h, const Loop *l, int64_t tick, double ahead, double *value);
 
+/* x <- a^-1 x (n), by elimination with pivots; `a` is overwritten. */
+void solve(double *a, double *x, int64_t n);
+
 Push push_samples; /* keeps the newest `depth` of them */
 
 #endif

@@ -58,8 +58,7 @@ static void exponential(double *a, int64_t n) {
     memcpy(a, sum, bytes);
 }
 
-/* x <- a^-1 x, by elimination with pivots; `a` is overwritten. */
-static void solve(double *a, double *x, int64_t n) {
+void solve(double *a, double *x, int64_t n) {
     for (int64_t i = 0; i < n; i++) {
         int64_t pivot = i;
         for (int64_t j = i + 1; j < n; j++)

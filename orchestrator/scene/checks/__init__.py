@@ -10,7 +10,15 @@ from itertools import chain, islice
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.orchestrator.base.errors import COUNTED
 from hapticlink.orchestrator.scene.blocks import blocks as plan_blocks
-from hapticlink.orchestrator.scene.checks import blocks, contacts, devices, fmus, linkage, numbers
+from hapticlink.orchestrator.scene.checks import (
+    blocks,
+    contacts,
+    devices,
+    fmus,
+    linkage,
+    numbers,
+    space,
+)
 from hapticlink.orchestrator.scene.conditions import parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -18,9 +26,8 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 def check_scene(scene: Scene) -> list[Problem]:
     """Every problem found, up to COUNTED: each may search for a similar name."""
-    shapes = list(
-        islice(chain(linkage.check_linkage(scene), contacts.check_contacts(scene)), COUNTED)
-    )
+    found = (space.check_space(scene), linkage.check_linkage(scene), contacts.check_contacts(scene))
+    shapes = list(islice(chain(*found), COUNTED))
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.
         scene = replace(scene, contacts=ContactsOfAllPairs(**vars(scene.contacts)))

@@ -6,7 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import get_args
 
 from hapticlink.components.specs.drives import ConstantDrive
-from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
+from hapticlink.components.specs.joint_types import (
+    ANGLE,
+    AXIS,
+    JOINT_TYPES,
+    CutType,
+    TreeType,
+)
 from hapticlink.components.specs.linkage import NO_POINT, Joint, Linkage, Loop
 from hapticlink.orchestrator.base.errors import unknown
 from hapticlink.orchestrator.scene.scene import Scene
@@ -78,6 +84,8 @@ def _own_keys(linkage: Linkage) -> Iterator[Problem]:
     }
     for table, (joints, types) in tables.items():
         of = {name: JOINT_TYPES[name].own_keys(types is CutType) for name in get_args(types)}
+        if linkage.dimension > 2:  # whose axes are numbers: checks/space.py
+            of = {name: tuple({*keys} - {AXIS, ANGLE}) for name, keys in of.items()}
         for key in dict.fromkeys(key for keys in of.values() for key in keys):
             able = " or ".join(f'"{name}"' for name in of if key in of[name])
             for i, joint in enumerate(joints):

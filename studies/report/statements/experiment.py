@@ -52,7 +52,7 @@ def _experiment(runs: Runs) -> Iterator[Statement]:
     found = (
         sorted(lengths),
         sorted(b.mass for b in linkage.body),
-        sorted(b.inertia for b in linkage.body),
+        sorted(b.moments[0] for b in linkage.body),
     )
     stated = sorted(appendix_a.L), sorted(appendix_a.M), sorted(appendix_a.J)
     yield compare(

@@ -16,7 +16,8 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.analysis.stability import forward_sensitivity, judge_scene
+from hapticlink.analysis.search.settings import Scales
+from hapticlink.analysis.stability import forward_sensitivity, judge_scene, margin_and_remedy
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses, worst_case
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
@@ -39,7 +40,7 @@ from hapticlink.commands.progress import steps
 from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.fmus.blocks import find_block, has_compiled
-from hapticlink.orchestrator.base.errors import Interrupted
+from hapticlink.orchestrator.base.errors import FmuFault, InputFault, Interrupted
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.system import fmu_files
@@ -203,7 +204,8 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
     [
         (
             Margin(0.0, None, math.inf),
-            "unstable with stiffnesses down to times 0.001, unstable at each graphics rate tried",
+            "stable with no stiffnesses tried, down to times 0.001, "
+            "stable at no graphics rate tried",
         ),
         (
             Margin(1.29, 0.0, 30.0),
@@ -228,6 +230,32 @@ def test_a_margin_is_told_on_its_safe_side_and_as_far_as_it_was_searched(
 ) -> None:
     """512/35 = 14.63: at 14.6 Hz it is unstable."""
     assert ", ".join(Stability._margins(Mock(margin=margin))) == told
+
+
+@pytest.mark.parametrize(
+    ("beyond", "known"),
+    [(InputFault("it has no equilibrium"), False), (FmuFault("a", "diverges", 0.0), True)],
+)
+def test_gains_without_an_equilibrium_are_not_known_to_be_unstable(
+    slider: hl.Scene, monkeypatch: pytest.MonkeyPatch, beyond: Exception, known: bool
+) -> None:
+    """Their margin is at least that with which there is one."""
+
+    class Faulty(InHands):
+        def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0):
+            if (scales or {}).get("drift", 1.0) > 1.3:
+                raise beyond
+            self._unused = late
+
+        def worst(self, *_: object) -> float:
+            return -1.0
+
+    monkeypatch.setattr(margin_and_remedy, "InHands", Faulty)
+    pose = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)[0]
+    case = Case(pose.name, "firm grip", -1.0, 0.0, 1.0, "oscillation", "stable", ())
+    margin, _ = improvements(slider, [pose], HANDS, DRIFT, case, lambda _: ([pose], ""))
+    assert margin.stiffness == pytest.approx(1.3, rel=0.02)
+    assert ("stiffness" not in margin.not_searched_further) == known
 
 
 SLIDER = """

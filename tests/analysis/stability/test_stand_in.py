@@ -59,7 +59,7 @@ def responding(law: Law) -> Callable[[np.ndarray], np.ndarray]:
     ],
 )
 def test_order_and_response_of_linear_laws(law: Law, order: int) -> None:
-    found = identify(responding(law), np.array([0.01, 0.01]))
+    found = identify(responding(law), np.array([0.01, 0.01]), ["a", "b"])
     assert found.order == order
     assert found.error < 1e-8
     own: dict[Any, float] = {}
@@ -77,7 +77,7 @@ def test_order_and_response_of_linear_laws(law: Law, order: int) -> None:
         (lambda e, t, own: np.sin(t), "1 of its outputs move with constant inputs"),
         (lambda e, t, own: K * abs(e), "is not linear: it is at a kink"),
         (lambda e, t, own: K * e**2, "is not linear: it is at a kink"),
-        (lambda e, t, own: round(e / 1e-3), "a count or a dead zone, which has no slope"),
+        (lambda e, t, own: round(e / 1e-3), "a does nothing by 0.0001 .* a count or a dead zone"),
         (lambda e, t, own: own.setdefault(round(t / T), e) * own.get(round(t / T) - 99, 1.0),
          "errs by .* memory of more than 64 steps"),
         (lambda e, t, own: (1 + t) * e, "errs by .* or changes with time"),
@@ -86,7 +86,7 @@ def test_order_and_response_of_linear_laws(law: Law, order: int) -> None:
 )  # fmt: skip
 def test_what_the_response_does_not_tell_is_refused_with_the_reason(law: Law, why: str) -> None:
     with pytest.raises(NotIdentified, match=why):
-        identify(responding(law), np.array([0.01, 0.01]))
+        identify(responding(law), np.array([0.01, 0.01]), ["a", "b"])
 
 
 def spring(folder: Path, force: str, **options: Any) -> dict[str, Any]:
@@ -129,6 +129,21 @@ def test_the_verdict_says_what_stands_for_the_fmu_and_how_exact_it_is(tmp_path: 
     assert (each["fmu"], each["order"]) == ("hand", 0)
     assert each["error"] < 1e-9
     assert "hand: its state cannot be read; a linear system of order 0 stands" in str(verdict)
+
+
+def test_a_parameter_that_changes_takes_another_system(tmp_path: Path) -> None:
+    """A map sets parameters where it can: not those of an FMU for which a system stands."""
+    body = 'values["F[1]"] = -self.K * values["x[1]"]'
+    ports = ("input", entries("x", 3)), ("output", entries("F", 3)), ("tunable", {"K": 100.0})
+    path = slave(tmp_path, "Law", *ports, body=body)
+    given = {"fmu": [{"replaces": "hand", "path": str(path)}], "linkage.start": {"rail": 0.0}}
+    points = hl.stability_map(
+        "sampled-spring", ["fmu.hand.start.K=100.0,50.0"], given, out=tmp_path / "map", jobs=1
+    )
+    none = np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0))
+    found = {float(row["fmu.hand.start.K"]): row["growth_rate"] for row in points.of("grid")}
+    expected = {stiff: pytest.approx(growth(*none, stiff), rel=1e-6) for stiff in (100.0, 50.0)}
+    assert found == expected
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])

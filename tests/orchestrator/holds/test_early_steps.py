@@ -75,6 +75,58 @@ def test_half_lead_goes_on_from_the_mean_of_the_frame(seed):
         np.testing.assert_allclose(hold.value(24, 7.0), y[8] + (y[8] - mean) / 2, rtol=1e-12)
 
 
+def reacting(rng, n, F, x, v, mobility):
+    """The value of `reaction` over a step of 24 ticks behind a first step without meaning, and the
+    mean of both velocities; F, x, v are samples, a row each."""
+    m = 2 * n
+    bench = Bench(2 * m + n * n, BASE)
+    further, beside = tuple(range(n, 3 * n)), bench.reader(range(2 * m + n * n))
+    hold = bench.hold("reaction", n, beside=beside, further=further)
+    far, near = rng.normal(size=(2, n))
+    bench.values[:] = np.concatenate([np.zeros(m), far, near, mobility.ravel()])
+    hold.push(0, np.concatenate([F[0], x[0], v[0]]), 0)
+    hold.value(0, 12.0)
+    for k in range(1, len(F)):
+        hold.push(3 * k, np.concatenate([F[k], x[k], v[k]]), 3 * k)
+    found = hold.value(3 * len(F) - 3, 12.0)
+    np.testing.assert_array_equal(hold.value(3 * len(F) - 3, 7.0), found)
+    return found, (far + near) / 2
+
+
+@few
+@given(seeds)
+def test_reaction_is_the_mean_effort_of_what_gives_way_as_it_did(seed):
+    """k and b by ridge regression of NumPy, the motion by the mean of its parabola."""
+    rng = np.random.default_rng(seed)
+    n, H = int(rng.integers(1, 5)), 24 * float(BASE)
+    x, v, rest = rng.normal(size=(3, 9, n))
+    root = rng.normal(size=(n, n))
+    k, b = rng.uniform(0, 5, (2, n))
+    F, mobility = rest - k * x - b * v, root @ root.T
+    found, rate = reacting(rng, n, F, x, v, mobility)
+    a = mobility @ found
+    for i in range(n):
+        z = np.stack([x[:, i], v[:, i]], axis=1)
+        z -= z.mean(axis=0)
+        scale = np.sqrt((z**2).mean(axis=0) + np.array([1e-5, 1e-5 / H]) ** 2)
+        ridge = np.sqrt(0.3 * len(z)) * np.eye(2)
+        y = np.concatenate([F[:, i].mean() - F[:, i], [0.0, 0.0]])
+        k_i, b_i = np.maximum(np.linalg.lstsq(np.vstack([z / scale, ridge]), y)[0] / scale, 0)
+        r = F[:, i] + k_i * x[:, i] + b_i * v[:, i]
+        moved, faster = rate[i] * H / 2 + a[i] * H**2 / 6, a[i] * H / 2
+        expected = F[-1, i] + (r[-1] - r.mean()) / 2 - k_i * moved - b_i * faster
+        assert found[i] == pytest.approx(expected, rel=1e-7, abs=1e-7)
+
+
+@few
+@given(seeds)
+def test_reaction_to_nothing_is_half_lead(seed):
+    rng = np.random.default_rng(seed)
+    F, still = rng.normal(size=(9, N)), np.ones((9, N))
+    found, _ = reacting(rng, N, F, still, 0 * still, np.eye(N))
+    np.testing.assert_allclose(found, F[-1] + (F[-1] - F.mean(axis=0)) / 2, rtol=1e-12)
+
+
 def mid(rng, n, K, B, mobility):
     bench = Bench(4 * n + n * n, BASE)
     reader = bench.reader(range(4 * n + n * n))

@@ -76,7 +76,7 @@ OF_SAMPLES = [
     if row.push == "samples" and row.needs not in ("gradient", "step", "coupling")
 ]
 """Without those whose laws are in test_model_hold.py and test_early_steps.py."""
-NOT_ALONE = ("spring", "coupling", "step")
+NOT_ALONE = ("spring", "coupling", "reaction", "step")
 """What a hold needs whose value does not follow from samples alone."""
 
 

@@ -104,7 +104,7 @@ def test_what_model_stands_for_is_recorded(tmp_path):
     holds = record["holds"]
     assert {holds[n] for n in holds if n.startswith("virtual_mechanism")} == {"ahead"}
     assert holds["controller.F_drift -> virtual_mechanism.F_drift"] == "mid"
-    assert holds["hand.F -> virtual_mechanism.F_hand"] == "half-lead"
+    assert holds["hand.F -> virtual_mechanism.F_hand"] == "reaction"
     assert record["causal"] is True
     assert record["without_effect"] == []
     assert r.folder
@@ -147,6 +147,7 @@ def test_what_is_planned_before_the_start_cannot_be_changed_in_a_run():
         (['holds."haptic_device.x"=ahead'], "haptic_device is not slower than"),
         (['holds."controller.F_drift"=ahead'], "controller is no plant"),
         (['holds."hand.F -> virtual_mechanism.F_hand"=mid'], "no force of a spring-damper"),
+        (['holds."haptic_device.x"=reaction'], "acts no force of a spring-damper"),
         (
             ['holds."controller.F_drift"=mid', 'delays."controller.F_drift"=0.01'],
             "however late its samples are",
@@ -264,3 +265,22 @@ def test_a_live_rate_leaves_time_for_the_result():
 
     hl.RealTime("closed-loop-ideal", options).run(turn)
     assert asked == [pytest.approx(50.0)]
+
+
+def test_a_stiff_arm_is_not_fed_back_a_frame_late():
+    """An arm of 300 N/m with a grip of 2000 N/m on firm gains at 20 Hz."""
+    arm = {"type": "arm", "stiffness": [300.0, 300.0, 0.0], "damping": [24.0, 24.0, 0.01]}
+    poses = [(0.038, -0.004), (0.062, 0.015), (0.031, 0.013), (0.059, 0.009), (0.027, 0.009)]
+    path = [[0.0, 0.04452, 0.0148, -0.7878]]
+    path += [[i / 2, x, y, -0.7878] for i, (x, y) in enumerate(poses, 1)]
+    gains = {
+        "controller.teleoperation.stiffness": [400.0, 400.0, 0.4],
+        "controller.teleoperation.damping": [40.0, 40.0, 0.04],
+    }
+    options = MODEL | gains | {"hand": arm | {"target": path}, "graphics.rate": 20}
+    errors = {}
+    for hold in ("half-lead", "reaction"):
+        own = {"holds": {"hand.F -> virtual_mechanism.F_hand": hold}}
+        r = hl.run("closed-loop-ideal", options | own, figures=False)
+        errors[hold] = r.tracking().distance_mm.max()
+    assert 2 * errors["reaction"] < errors["half-lead"], errors

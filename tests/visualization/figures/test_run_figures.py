@@ -8,6 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.user_port import user_port
+from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.figures import run_figures, sweep_figure
@@ -161,3 +162,10 @@ def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     )
     assert sweep_figure.axis("graphics.rate") == "graphics rate (Hz)"
     assert sweep_figure.axis("hold") == "hold"
+
+
+def test_a_run_without_files_has_the_figures_of_one_in_a_folder(tmp_path) -> None:
+    options = {"duration": 0.05}
+    kept = hl.run("single-body", options, out=tmp_path, figures=False)
+    run = simulate(hl.scene("single-body", options), tmp_path / "rows", in_memory=True, csv=False)
+    assert run_figures.figures(run.results).keys() == kept.figures().keys() != set()

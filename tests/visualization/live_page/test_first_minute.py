@@ -167,6 +167,18 @@ def test_slowed_down_it_vibrates_until_the_remedy_is_pressed(
     has_its_first_minute(page)
 
 
+def test_the_remedy_is_pressed_although_the_line_on_a_run_that_ended_goes(
+    served: Served, window: Callable[..., Page]
+) -> None:
+    """It stands above the picture, so that all below it moves up."""
+    page = window(served.url)
+    page.until("!document.getElementById('first').hidden")
+    page.get("document.getElementById('ended').textContent = 'Diverged at 1 s, and why'")
+    page.page.click("#remedy")
+    page.until("document.getElementById('remedy').ariaPressed === 'true'")
+    assert page.page.inner_text("#ended") == ""
+
+
 def test_more_is_folded_until_it_is_asked_for_by_a_click_or_a_link(
     served: Served, window: Callable[..., Page]
 ) -> None:

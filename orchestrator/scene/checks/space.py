@@ -1,0 +1,125 @@
+"""Checks a linkage in space: its types, axes and inertias, and what is of the plane alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import get_args
+
+import numpy as np
+
+from hapticlink.components.specs.hand import ArmHand
+from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
+from hapticlink.components.specs.linkage import Joint, Linkage, Loop
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+
+PARALLEL = 1e-9
+"""Sine of the angle between two axes below which they are one."""
+_ARM = ArmHand(target=())
+_OF_ARM = ("mass", "stiffness", "damping", "grip_stiffness", "grip_damping")
+ON_JOINTS = ("stiffness", "rest", "damping", "friction", "limits", "drive")
+"""Keys that act on the coordinate of a joint."""
+TURNED_ROUND = 1e-9
+"""The share of the largest moment of inertia by which it may exceed the sum of the others."""
+
+
+def check_space(scene: Scene) -> Iterator[Problem]:
+    if scene.linkage is None or scene.linkage.dimension == 2:
+        return
+    linkage = scene.linkage
+    yield from _of_the_plane(scene, linkage)
+    kinds: tuple[tuple[str, Sequence[Joint | Loop], object], ...] = (
+        ("joint", linkage.joint, TreeType),
+        ("loop", linkage.loop, CutType),
+    )
+    for table, joints, types in kinds:
+        able = [name for name in get_args(types) if JOINT_TYPES[name].in_space]
+        for i, joint in enumerate(joints):
+            path: Path = ("linkage", table, i)
+            if not joint.kind.in_space:
+                wanted = ", ".join(able)
+                yield (*path, "type"), f"a {joint.type} joint is of the plane: take one of {wanted}"
+            else:
+                yield from _axes(path, joint)
+    for i, body in enumerate(linkage.body):
+        yield from _inertia(("linkage", "body", i, "inertia"), body.moments)
+
+
+def _axes(path: Path, joint: Joint | Loop) -> Iterator[Problem]:
+    """Problems of the axes of a joint, and of what is of the plane."""
+    needed = joint.kind.axes
+    kind = f"a {joint.type} joint"
+    if joint.axis is not None and not isinstance(joint.axis, tuple):
+        key = "axis" if isinstance(joint, Joint) else "axes"
+        text = "an angle is of the plane: give three numbers"
+        yield (*path, "axis"), f"{text} as {key}"
+        return
+    if isinstance(joint, Loop):
+        given: list[tuple[Path, tuple[float, ...] | None]] = [
+            ((*path, "axes", k), axis) for k, axis in enumerate(joint.axes or (None, None))
+        ]
+        wanted, is_given = "`axes`", joint.axes is not None
+        if joint.angle is not None:
+            yield (*path, "angle"), "is of the plane: in space the frames become parallel"
+        for key in ON_JOINTS:
+            if getattr(joint, key) is not None:
+                text = "acts on a joint of the tree in space: cut the loop at another joint"
+                yield (*path, key), text
+    else:
+        given = [((*path, "axis"), joint.axis), ((*path, "second_axis"), joint.second_axis)]
+        wanted, is_given = "`axis` and `second_axis`", None not in (joint.axis, joint.second_axis)
+        if needed < 2 and joint.second_axis is not None:
+            yield (*path, "second_axis"), f"{kind} has no second axis: take it out"
+    for place, axis in given:
+        if axis is not None and not needed:
+            yield place, f"{kind} has no axis: take it out"
+        elif axis is not None and not np.linalg.norm(axis) > 0:
+            yield place, f"{list(axis)} has no length: give a direction"
+    if needed == 2 and not is_given:
+        yield path, f"{kind} needs both its axes: give {wanted}"
+    elif needed == 2 and isinstance(joint, Joint):
+        first, second = (np.array(axis, float) for _, axis in given)
+        lengths = np.linalg.norm(first) * np.linalg.norm(second)
+        if lengths > 0 and np.linalg.norm(np.cross(first, second)) <= PARALLEL * lengths:
+            yield (
+                (*path, "second_axis"),
+                "is parallel to `axis`: give two directions",
+            )
+
+
+def _inertia(path: Path, moments: tuple[float, ...]) -> Iterator[Problem]:
+    """Problems of principal moments that no distribution of mass has."""
+    if moments[0] < 0 or (moments[-1] > sum(moments[:-1]) * (1 + TURNED_ROUND) and moments[1:]):
+        found = ", ".join(f"{moment:.6g}" for moment in moments)
+        yield (
+            path,
+            f"no body has the principal moments {found}: each is at most the sum of the two others",
+        )
+
+
+def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
+    """What a scene with a linkage in space cannot have yet."""
+    for key in ("device", "devices", "controller", "controllers"):
+        if getattr(scene, key):
+            text = "renders a planar linkage: take it out, as one in space runs with hands alone"
+            yield (key,), f"{text}; here {linkage.spatial} put it in space"
+    for user, hand in scene.all_hands.items():
+        here: Path = ("hands", user) if user else ("hand",)
+        for key in _OF_ARM if isinstance(hand, ArmHand) else ():
+            if getattr(hand, key) == getattr(_ARM, key):
+                text = "the default is of the plane, with a moment: give three numbers for x, y, z"
+                yield (*here, key), text
+    if scene.contacts:
+        text = "are of the plane: a linkage in space has none, take them out"
+        yield ("contacts",), f"{text}; here {linkage.spatial} put it in space"
+    if scene.local_model:
+        yield ("local_model",), "is of the plane: leave it out"
+    if linkage.points:
+        yield ("linkage", "points"), "in space the hand holds one point: give `operational_point`"
+    if scene.graphics and scene.graphics.sync != "exact":
+        yield ("graphics", "sync"), "a copy in space follows the coordinates: take 'exact'"
+    for i, body in enumerate(linkage.body):
+        for key in ("radius", "corners"):
+            if getattr(body, key) is not None:
+                text = "is a shape of the plane, and in space nothing touches: take it out"
+                yield ("linkage", "body", i, key), text

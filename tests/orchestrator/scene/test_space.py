@@ -1,0 +1,95 @@
+"""What a linkage in space is refused for, each by a change of a scene that is read."""
+
+import pytest
+
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.scene import read_and_check
+
+SCENE = """
+title = "A bar on a ball, and a slider"
+duration = 0.1
+
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.3] }
+gravity = [0.0, 0.0, -9.81]
+
+[[linkage.body]]
+name = "bar"
+mass = 1.0
+inertia = [0.02, 0.02, 0.001]
+
+[[linkage.body]]
+name = "block"
+mass = 1.0
+inertia = 0.01
+
+[[linkage.joint]]
+name = "ball"
+type = "spherical"
+child = "bar"
+
+[[linkage.joint]]
+name = "slide"
+type = "prismatic"
+child = "block"
+axis = [1.0, 0.0, 0.0]
+"""
+ROD = (
+    "linkage.loop.+={ type = 'rod', bodies = ['bar', 'block'], "
+    "at = [[0, 0, 0.1], [0.3, 0, 0]], length = 0.31622776601683794%s }"
+)
+CUT = "linkage.loop.+={ bodies = ['bar', 'block'], at = [[0, 0, 0], [0, 0, 0]]%s }"
+HOOKE = "linkage.joint.ball={ name = 'ball', type = 'universal', child = 'bar'%s }"
+REFUSED = [
+    ("linkage.joint.slide.axis=[0, 0, 0]", "linkage.joint[1] (slide).axis: [0.0, 0.0, 0.0] has no"),
+    ("linkage.joint.slide.axis=0.5", "an angle is of the plane: give three numbers as axis"),
+    ("linkage.joint.ball.axis=[0, 0, 1]", "a spherical joint has no axis: take it out"),
+    ("linkage.joint.ball.second_axis=[0, 0, 1]", "has no second axis: take it out"),
+    ("linkage.joint.ball.type=free", "a free joint is of the plane: take one of revolute"),
+    ("linkage.start.ball=[0.1, 0.2]", "a spherical joint takes three numbers"),
+    (HOOKE % "", "a universal joint needs both its axes: give `axis` and `second_axis`"),
+    (HOOKE % ", axis = [1, 0, 0], second_axis = [2, 0, 0]", "is parallel to `axis`: give two"),
+    (CUT % ", axes = [[0, 0, 1], [0, 0, 0]]", "has no length: give a direction"),
+    (CUT % ", type = 'universal'", "needs both its axes: give `axes`"),
+    (CUT % ", damping = 1.0", "damping: acts on a joint of the tree in space: cut the loop at"),
+    (CUT % ", type = 'slot'", "a slot joint is of the plane: take one of revolute, prismatic, uni"),
+    (CUT % ", type = 'rod'", "a rod joint needs its length (m)"),
+    (CUT % ", axis = 0.1", "an angle is of the plane: give three numbers as axes"),
+    (CUT % ", type = 'prismatic', angle = 0.1", "in space the frames become parallel"),
+    ("linkage.body.bar.inertia=[0.1, 0.02, 0.02]", "no body has the principal moments 0.02, 0.02,"),
+    ("linkage.body.bar.radius=0.1", "is a shape of the plane, and in space nothing touches"),
+    ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
+    ("controller={}", "controller: renders a planar linkage"),
+    ("device={}", "hands alone; here a spherical joint put it in space"),
+    ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
+    ("local_model=true", "local_model: is of the plane: leave it out"),
+]
+
+
+def test_the_scene_itself_is_read():
+    linkage = open_scene.load(read_and_check.read_scene(SCENE, [ROD % ""])).linkage
+    assert linkage.dimension == 3
+    assert linkage.coordinate_units == ("rad", "rad", "rad", "m")
+
+
+@pytest.mark.parametrize(("option", "message"), REFUSED)
+def test_refused(option, message):
+    with pytest.raises(InputFault) as refused:
+        read_and_check.read_scene(SCENE, [option])
+    assert message in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("option", "cause"),
+    [
+        ("linkage.gravity=[0.0, -9.81, 0.0]", "three numbers of gravity"),
+        ("linkage.body.link1.inertia=[1e-4, 1e-4, 1e-4]", "three numbers of inertia"),
+        ("linkage.operational_point.at=[0.02, 0.0, 0.0]", "three numbers of at of a point"),
+    ],
+)
+def test_a_planar_scene_is_told_what_put_it_in_space(option, cause):
+    with pytest.raises(InputFault) as refused:
+        open_scene.load("closed-loop-ideal", [option])
+    assert "device: renders a planar linkage: take it out" in str(refused.value)
+    assert f"here {cause} put it in space" in str(refused.value)

@@ -1,0 +1,204 @@
+"""Linkages in space that tests use: overconstrained loops with known motions, and a top."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
+
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def bricard():
+    """IFToMM benchmark A04: five square rods of 1 m, .1 m thick, on edges of a cube; P3 is the end
+    of the second."""
+    edges = [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
+    axes = [Y, Z, X, Y, Z]
+    bodies, joints = [], []
+    for i, (edge, axis) in enumerate(zip(edges, axes, strict=True)):
+        moments = [0.01 / 6 if along else 1.01 / 12 for along in edge]
+        center = tuple(e / 2 for e in edge)
+        bodies.append(Body(name=f"rod{i}", mass=1.0, inertia=tuple(moments), center=center))
+        before = {"parent": f"rod{i - 1}", "at_parent": edges[i - 1]} if i else {}
+        joints.append(Joint(name=f"joint{i}", child=f"rod{i}", axis=axis, **before))
+    return Linkage(
+        body=tuple(bodies),
+        joint=tuple(joints),
+        loop=(Loop(bodies=("rod4", "ground"), at=(edges[4], Z), axes=(X, X)),),
+        operational_point=OperationalPoint(body="rod1", at=edges[1]),
+        gravity=(0.0, -9.81, 0.0),
+    )
+
+
+def bennett():
+    """Four revolute joints with opposite links equal: a, alpha and b, beta with
+    a sin(beta) = b sin(alpha). It is closed at q, by the joints of the tree."""
+    a, alpha, beta = 0.3, 0.9, 0.5
+    b = a * math.sin(beta) / math.sin(alpha)
+    return closed(
+        dh_loop([(a, alpha), (b, beta), (a, alpha), (b, beta)], bennett_angles(alpha, beta))
+    )
+
+
+def bennett_angles(alpha, beta, theta=1.1):
+    """Bennett's condition tan(theta_1/2) tan(theta_2/2) = sin((beta + alpha)/2)/sin((beta -
+    alpha)/2), opposite angles adding to a full turn."""
+    k = math.sin((beta + alpha) / 2) / math.sin((beta - alpha) / 2)
+    other = 2 * math.atan(k / math.tan(theta / 2))
+    return [theta, other, 2 * math.pi - theta, 2 * math.pi - other]
+
+
+def sarrus():
+    """Two pairs of plates, the hinges of one along x and of the other along y, carry a table that
+    moves along z."""
+    length, half, angle = 0.2, 0.1, 0.6
+    rise = length * math.sin(angle)
+    out = length * math.cos(angle)
+    lower_x, lower_y = (0.0, half, 0.0), (half, 0.0, 0.0)
+    arms = {
+        "x": (X, lower_x, (0.0, out, rise), (0.0, -out, rise)),
+        "y": (Y, lower_y, (out, 0.0, rise), (-out, 0.0, rise)),
+    }
+    bodies, joints = [], []
+    for name, (axis, base, first, second) in arms.items():
+        bodies += [plate(f"{name}1", first), plate(f"{name}2", second)]
+        joints.append(Joint(name=f"{name}1", child=f"{name}1", at_parent=base, axis=axis))
+        joints.append(
+            Joint(name=f"{name}2", parent=f"{name}1", child=f"{name}2", at_parent=first, axis=axis)
+        )
+    bodies.append(Body(name="table", mass=0.5, inertia=(0.002, 0.002, 0.004)))
+    hinge = {"at_parent": arms["x"][3], "at_child": lower_x}
+    joints.append(Joint(name="table", parent="x2", child="table", axis=X, **hinge))
+    loop = Loop(bodies=("y2", "table"), at=(arms["y"][3], lower_y), axes=(Y, Y))
+    return Linkage(
+        body=tuple(bodies),
+        joint=tuple(joints),
+        loop=(loop,),
+        operational_point=OperationalPoint(body="table"),
+    )
+
+
+def plate(name, end, mass=0.3):
+    """A thin rod from the origin of its frame to `end`, a hundredth as thick."""
+    r = np.array(end)
+    tensor = mass / 12 * (r @ r * 1.0001 * np.eye(3) - np.outer(r, r))
+    entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+    center = tuple(float(v) for v in r / 2)
+    return Body(name=name, mass=mass, inertia=tuple(float(v) for v in entries), center=center)
+
+
+def rssr(closure="spherical"):
+    """A crank about z and a rocker about x, coupled by a rod between two balls, which turns idly
+    about itself; or by a massless one, a closure."""
+    crank, pivot, rocker = (0.1, 0.0, 0.0), (0.3, 0.1, 0.0), (0.0, 0.0, 0.25)
+    span = tuple(float(v) for v in np.add(pivot, rocker) - np.array(crank))
+    bodies = [plate("crank", crank), plate("rocker", rocker)]
+    joints = [
+        Joint(name="crank", child="crank", axis=Z),
+        Joint(name="rocker", child="rocker", axis=X, at_parent=pivot),
+    ]
+    point = OperationalPoint(body="rocker", at=rocker)
+    if closure == "rod":
+        length = float(np.linalg.norm(span))
+        loop = Loop(type="rod", bodies=("crank", "rocker"), at=(crank, rocker), length=length)
+    else:
+        bodies.append(plate("rod", span))
+        joints.append(
+            Joint(name="rod", type="spherical", parent="crank", child="rod", at_parent=crank)
+        )
+        loop = Loop(type="spherical", bodies=("rod", "rocker"), at=(span, rocker))
+    return Linkage(body=tuple(bodies), joint=tuple(joints), loop=(loop,), operational_point=point)
+
+
+def dh_loop(links, angles):
+    """Points and axes of a closed chain of revolute joints by Denavit and Hartenberg's lengths and
+    twists (a, alpha), at joint angles."""
+    frame, points, axes = np.eye(4), [], []
+    for (a, alpha), theta in zip(links, angles, strict=True):
+        points.append(frame[:3, 3])
+        axes.append(frame[:3, 2])
+        c, s = math.cos(theta), math.sin(theta)
+        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
+        c, s = math.cos(alpha), math.sin(alpha)
+        along = np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
+        frame = frame @ turn @ along
+    np.testing.assert_allclose(frame, np.eye(4), atol=1e-12)
+    return points, axes
+
+
+def closed(loop):
+    """The linkage of a closed chain, its last joint cut, with rods between the joints."""
+    points, axes = loop
+    n = len(points)
+    bodies, joints = [], []
+    spans = [tuple(float(v) for v in points[(i + 1) % n] - points[i]) for i in range(n)]
+    for i in range(n - 1):
+        bodies.append(plate(f"rod{i}", spans[i]))
+        before = {"parent": f"rod{i - 1}", "at_parent": spans[i - 1]} if i else {}
+        axis = tuple(axes[i].tolist())
+        joints.append(Joint(name=f"joint{i}", child=f"rod{i}", axis=axis, **before))
+    last = tuple(axes[n - 1].tolist())
+    end = tuple(points[n - 1].tolist())
+    cut = Loop(bodies=(f"rod{n - 2}", "ground"), at=(spans[n - 2], end), axes=(last, last))
+    point = OperationalPoint(body="rod1", at=spans[1])
+    return Linkage(body=tuple(bodies), joint=tuple(joints), loop=(cut,), operational_point=point)
+
+
+def top(**changes):
+    """A heavy symmetric top on its point, 40 rad/s about its axis, which leans by .5 rad."""
+    lean = 0.5
+    axis = np.array([math.sin(lean), 0.0, math.cos(lean)])
+    along, across, mass, arm = 8e-4, 2e-3, 0.5, 0.06
+    tensor = across * np.eye(3) + (along - across) * np.outer(axis, axis)
+    entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+    body = Body(
+        name="top",
+        mass=mass,
+        inertia=tuple(float(v) for v in entries),
+        center=tuple((arm * axis).tolist()),
+    )
+    spin = tuple((40.0 * axis).tolist())
+    linkage = Linkage(
+        body=(body,),
+        joint=(Joint(name="ball", type="spherical", child="top"),),
+        operational_point=OperationalPoint(body="top", at=tuple((0.1 * axis).tolist())),
+        gravity=(0.0, 0.0, -9.81),
+        start_velocity={"ball": spin},
+    )
+    return replace(linkage, **changes)
+
+
+DELTA = {"base": 0.06, "platform": 0.03, "arm": 0.1, "rod": 0.22, "mass": 0.2, "inertia": 4e-4}
+"""Radii of the pivots and of the platform's joints, lengths (m), mass of the platform (kg), and
+inertia of an arm about its pivot (kg.m2)."""
+
+
+def delta():
+    """Three arms on the ground and a platform that does not turn, coupled by rods without mass:
+    of a delta each pair of rods keeps the platform's directions, and is one rod here."""
+    bodies = [Body(name="platform", mass=DELTA["mass"], inertia=1e-4)]
+    bodies += [Body(name=n, mass=0.0, inertia=1e-4) for n in ("x", "xy")]
+    slides = [("x", "ground", "x", X), ("y", "x", "xy", Y), ("z", "xy", "platform", Z)]
+    joints = [
+        Joint(name=name, type="prismatic", parent=parent, child=child, axis=axis)
+        for name, parent, child, axis in slides
+    ]
+    loops = []
+    for k in range(3):
+        out = np.array([math.cos(2 * math.pi * k / 3), math.sin(2 * math.pi * k / 3), 0.0])
+        axis, arm = np.cross(out, Z), tuple((DELTA["arm"] * out).tolist())
+        bodies.append(Body(name=f"arm{k}", mass=0.0, inertia=DELTA["inertia"]))
+        pivot = tuple((DELTA["base"] * out).tolist())
+        joints.append(
+            Joint(name=f"arm{k}", child=f"arm{k}", at_parent=pivot, axis=tuple(axis.tolist()))
+        )
+        at = tuple((DELTA["platform"] * out).tolist())
+        ends = {"bodies": (f"arm{k}", "platform"), "at": (arm, at)}
+        loops.append(Loop(type="rod", **ends, length=DELTA["rod"]))
+    return Linkage(
+        body=tuple(bodies),
+        joint=tuple(joints),
+        loop=tuple(loops),
+        operational_point=OperationalPoint(body="platform"),
+    )
