@@ -116,9 +116,9 @@ def _minimum(
     bounds: Sequence[tuple[float, float]],
     near: Vector | None = None,
 ) -> optimize.OptimizeResult:
-    """The smallest of the minima from some starts: both signs and three sizes of the slope."""
-    slopes = [np.array([s]) for s in (-20.0, -6.0, -2.0, 2.0, 6.0, 20.0)]
-    before = [np.array([at]) for at in (-0.3, 0.0, 0.3)] if len(bounds) == 3 else [np.empty(0)]
+    """The smallest of the minima from some starts: both signs and two sizes of the slope."""
+    slopes = [np.array([s]) for s in (-12.0, -4.0, 4.0, 12.0)]
+    before = [np.array([at]) for at in (-0.2, 0.2)] if len(bounds) == 3 else [np.empty(0)]
     starts = [near] if near is not None else []
     if near is None:
         starts = [np.concatenate([b, s, [0.02]]) for b in before for s in slopes]
