@@ -211,7 +211,8 @@ def _describe_saturation(measures: Measures) -> Iterator[str]:
     """A line for each user whose motors were at their torque limit, and for how long."""
     for said, spans in groupby(measures.saturations, key=lambda episode: episode.said):
         seconds = sum(span.end - span.begin for span in spans)
-        yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
+        if seconds > 0:
+            yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 
 
 def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
