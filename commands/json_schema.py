@@ -12,8 +12,10 @@ from dataclasses import MISSING, is_dataclass
 from types import NoneType
 from typing import Any
 
+from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.scene import key_descriptions, types_of_keys
+from hapticlink.orchestrator.scene.device_files import NAMED as BY_NAME
 from hapticlink.orchestrator.scene.hold_tables import HoldTable
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import ForeignFmu
@@ -69,6 +71,13 @@ class _Definitions:
                 # A dotted name may also be written as nested tables.
                 values = {"anyOf": [found["additionalProperties"], {"type": "object"}]}
                 found["additionalProperties"] = values
+            if record is Device and key in BY_NAME:
+                (entries,) = (branch for branch in typing.get_args(hint) if is_dataclass(branch))
+                changed = {
+                    "type": "object",
+                    "additionalProperties": self._reference(entries, False),
+                }
+                found = {"anyOf": [found, changed]}
             about = key_descriptions.meanings(record)[key]
             properties[key] = {"description": about + _measure(hint), **found}
             if default is MISSING:

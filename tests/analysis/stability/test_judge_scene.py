@@ -31,6 +31,7 @@ from hapticlink.analysis.stability.poses import (
     choose_evenly_spaced,
     find_rest_poses,
     simulate_scene,
+    visited_poses,
 )
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
@@ -508,11 +509,11 @@ def test_a_run_that_fails_is_said_first() -> None:
 
 
 def test_a_run_without_a_pose_is_refused_with_its_own_fault() -> None:
-    """A start pose that the device does not reach: what is said of it is not that it was not
-    recorded."""
-    far = {"linkage.operational_point.at": [3.0, 0.0]}
-    with pytest.raises(hl.InputFault, match=r"own run fails before its first pose: .*outside the"):
-        hl.stability("closed-loop-ideal", far, poses=1)
+    """What is said of it is not that poses were not recorded."""
+    run = simulate_scene("sampled-spring", {"hand.stiffness": [1e7, 0.0, 0.0]})
+    assert run.record.fault
+    with pytest.raises(hl.InputFault, match=r"own run fails before its first pose: .*has diverged"):
+        visited_poses(replace(run, tables={}))
 
 
 def test_what_cannot_be_held_is_refused() -> None:
