@@ -34,8 +34,8 @@ CODE_LINES = {
     "fmus": 2991,
     "orchestrator": 16342,
     "programs": 1023,
-    "analysis": 8888,
-    "visualization": 3601,
+    "analysis": 8889,
+    "visualization": 3676,
     "api": 635,
     "commands": 1606,
 }
