@@ -85,7 +85,8 @@ def _instruction(function: ca.Function, k: int) -> str:
     if operation == ca.OP_OUTPUT:
         return f"r{into[0]}[{into[1]}] = w{of[0]}"
     if operation == ca.OP_CALL:
-        return f"{', '.join(f'w{i}' for i in into)}, = {_name_of_call(function, k)}(w{of[0]})"
+        given = ", ".join("_" if i < 0 else f"w{i}" for i in into)  # below 0 where nobody reads it
+        return f"{given}, = {_name_of_call(function, k)}(w{of[0]})"
     template = TEMPLATES.get(operation)
     if template is None:
         name = _NAMES.get(operation, str(operation))

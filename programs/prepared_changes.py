@@ -148,6 +148,7 @@ def _family(machine: Machine, simulation: Simulation, plan: Plan, event: Event) 
         block = plan.block(event._replace(firings=firings))
         first, last = machine.block([*instructions(block, simulation)])
         blocks.append((first, last - first))
+    machine.publish()
     sizes = {n for _, n in blocks}
     if len(sizes) > 1:
         return None

@@ -488,6 +488,7 @@ def _start(results: Results) -> Iterator[str]:
         and of_port(results, HANDLE_POSE)
         and len(device["time"])
         and device[WORKSPACE_MARGIN][0] < 0
+        and not results.record.fault
     ):
         start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
         yield f"warning: {describe_start_outside(start, margin)}"

@@ -15,11 +15,12 @@ from hapticlink.orchestrator.base.errors import (
     AsksToEnd,
     Diverged,
     Fault,
+    FmuFault,
     Interrupted,
     describe_memory_error,
     describe_os_error,
 )
-from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN
+from hapticlink.orchestrator.base.signal_names import DEVICE, WORKSPACE_MARGIN
 from hapticlink.orchestrator.host import host_state
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import causal
@@ -29,6 +30,7 @@ from hapticlink.orchestrator.run import kept_runs, run_state
 from hapticlink.orchestrator.run.compiled import lanes
 from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop, Halt
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
+from hapticlink.orchestrator.run.initialize import start_outside
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.run_state import RunState
@@ -205,6 +207,8 @@ class _Run:
             outcome.details = _details(self._plan, simulation, self.loop, self._real_time)
             if self._ended:
                 kept_runs.keep(self._ended)
+            if outcome.fault is None and (outside := _find_start_outside(outcome, simulation)):
+                outcome.reason, outcome.fault = "fault", outside
             if outcome.fault is None and (diverged := _judge_energy(outcome, simulation)):
                 outcome.reason, outcome.fault = "diverged", diverged
         return outcome
@@ -341,16 +345,29 @@ def _details(
     )
 
 
+def _left_workspace(outcome: Outcome, simulation: Simulation) -> str:
+    """The device of which the handle left the workspace; "" for another end."""
+    system, condition = simulation.system, simulation.system.ends_when
+    if outcome.reason != "stop_when" or condition is None:
+        return ""
+    watched = f"{system.block(condition.fmu)}.{condition.variable}"
+    return condition.fmu if watched == WORKSPACE_MARGIN else ""
+
+
+def _find_start_outside(outcome: Outcome, simulation: Simulation) -> FmuFault | None:
+    """The fault of a run that ended before its first step, since its handle cannot be there."""
+    device = _left_workspace(outcome, simulation)
+    own = device and simulation.system.fmu[device].description.block == DEVICE
+    if own and not outcome.details.calls[device].get("step"):
+        return start_outside(device, simulation.instances[device])
+    return None
+
+
 def _judge_energy(outcome: Outcome, simulation: Simulation) -> Diverged | None:
     """The fault of a run that reached its end but has diverged; None if it has not."""
-    system, condition = simulation.system, simulation.system.ends_when
-    if (
-        outcome.reason == "stop_when"
-        and condition
-        and f"{system.block(condition.fmu)}.{condition.variable}" == WORKSPACE_MARGIN
-        and (why := outcome.details.unstable)
-    ):
+    device = _left_workspace(outcome, simulation)
+    if device and (why := outcome.details.unstable):
         what = f"left its workspace, and {why}: the loop is unstable"
         remedy = "take higher rates, weaker gains, another coupling or hold"
-        return Diverged(condition.fmu, f"{what} ({remedy})", outcome.end_time, repeatable=True)
+        return Diverged(device, f"{what} ({remedy})", outcome.end_time, repeatable=True)
     return simulation.balance.judge(outcome.details.meters, outcome.end_time)

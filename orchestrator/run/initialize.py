@@ -317,15 +317,15 @@ START_POSE_OUTPUTS = {DEVICE: ("workspace_margin", "x_true")}
 
 
 def require_finite(instances: Mapping[str, Instance]) -> None:
-    """Raises FmuFault if an output is not finite. If the device's arms do not reach the start pose,
-    which makes its angles and all that depends on them NaN, the fault says so instead of naming the
-    first such output."""
-    for fmu, instance in instances.items():
-        if instance.description.block == DEVICE and not np.isfinite(instance.outputs).all():
-            names = (s.name for s in instance.description.outputs)
-            start = dict(zip(names, instance.outputs.tolist(), strict=True))
-            if (margin := start["workspace_margin"]) < 0:
-                pose = [start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)]
-                raise FmuFault(fmu, describe_start_outside(pose, margin), 0.0, repeatable=True)
+    """Raises FmuFault if an output is not finite."""
     for instance in instances.values():
         instance.require_finite()
+
+
+def start_outside(fmu: str, device: Instance) -> FmuFault:
+    """The fault of a run that ends before its first step, outside of the device's workspace."""
+    names = (s.name for s in device.description.outputs)
+    start = dict(zip(names, device.outputs.tolist(), strict=True))
+    pose = [start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)]
+    told = describe_start_outside(pose, start["workspace_margin"])
+    return FmuFault(fmu, told, 0.0, repeatable=True)

@@ -70,7 +70,8 @@ def fmu_files(
         given: Starts = {}
         experiment: dict[str, float] = {}
         settings, packaging = block.settings, scene.packaging
-        if _prefers_compiled.get() and not block.engine and has_compiled(block.block, settings):
+        prefers = _prefers_compiled.get() and not scene.resume  # a state fits the FMU that saved it
+        if prefers and not block.engine and has_compiled(block.block, settings):
             packaging = "native"
         if starts is not None:
             steps = sizes(timeline.of[block.name], timeline)

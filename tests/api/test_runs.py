@@ -232,13 +232,13 @@ def test_a_fault_of_the_run_is_told_with_its_results(bar: Path, tmp_path: Path) 
     assert hl.run(bar).fault is None
 
 
-def test_a_fault_before_the_first_step_has_no_samples() -> None:
+def test_a_start_outside_of_the_workspace_is_a_fault_before_the_first_step() -> None:
     far = {"linkage.operational_point": {"body": "link2", "at": [0.9, 0.0]}}
     lost = hl.run("closed-loop-ideal", far)
     said = "haptic_device: the start pose (x m, y m, theta rad) = (0.66"
     assert str(lost.fault).startswith(said)
     assert "outside the device's workspace by 0.7" in str(lost.fault)
-    assert [len(part) for part in lost.tracking()] == [0, 0, 0]
+    assert [len(part) for part in lost.tracking()] == [1, 1, 1]
     assert lost.figures() == {}
     (row,) = hl.sweep("closed-loop-ideal", {"duration": [0.1]}, far, jobs=1).rows
     assert row["end"] == "fault"

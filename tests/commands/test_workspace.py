@@ -26,7 +26,11 @@ def test_a_start_outside_is_told_by_info_and_by_a_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert OUTSIDE in list(lines(device(), (0.22, 0.0, 0.0)))[-1]
-    assert status("run", "single-body", "--no-figures", "--out", tmp_path, *FAR) == 0
+    assert status("run", "single-body", "--no-figures", "--out", tmp_path, *FAR) == 1
+    told = capsys.readouterr()
+    assert f"{told.out}{told.err}".count(OUTSIDE) == 1
+    on = ("--set", "stop_when=''", "--set", "duration=0.01")
+    assert status("run", "single-body", "--no-figures", "--out", tmp_path, *FAR, *on) == 0
     assert OUTSIDE in capsys.readouterr().out
 
 

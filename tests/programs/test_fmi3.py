@@ -69,7 +69,7 @@ def test_vectors_and_matrices_are_arrays() -> None:
     assert found["haptic_device.v"].derivative is found["haptic_device.x"]
     gain = found["controller.k_j"]
     assert (gain.unit, gain.causality, gain.variability) == ("1/s2", "parameter", "tunable")
-    assert found["haptic_device.base_x"].variability == "fixed"
+    assert found["haptic_device.crank.mass"].variability == "fixed"
     options = (SECOND, 'record.signals=["virtual_mechanism.x[1]", "virtual_mechanism.v"]')
     found = variables(program("closed-loop-ideal", options, fmi=3))
     recorded = [name for name, v in found.items() if v.causality == "output"]
@@ -109,8 +109,8 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
         assert message == "hand.F[2] cannot be nan"
         message = fails(slave.setFloat64, [at["haptic_device.x[1]"]], [0.0] * 3)
         assert message == "haptic_device.x[1] is no input or parameter"
-        message = fails(slave.setFloat64, [at["haptic_device.base_x"]], [0.0])
-        assert message.startswith("parameter haptic_device.base_x is fixed")
+        message = fails(slave.setFloat64, [at["haptic_device.crank.mass"]], [0.0])
+        assert message.startswith("parameter haptic_device.crank.mass is fixed")
         assert fails(slave.getInt32, [force]).startswith("fmi3GetInt32: this FMU is for co-sim")
         assert fails(slave.enterEventMode).startswith("fmi3EnterEventMode: this FMU is for co-sim")
         assert slave.doStep(0.0, 0.1) == (*nothing[:2], False, 0.1)

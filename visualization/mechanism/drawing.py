@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.visualization.figure_axes import headline, plain
 from hapticlink.visualization.mechanism import mark_places, workspace_drawing
 from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, place
@@ -32,8 +33,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from hapticlink.orchestrator.scene.blocks import described_devices
-from hapticlink.orchestrator.scene.scene import Scene
+    from hapticlink.orchestrator.scene.scene import Scene
 
 Coordinates = Sequence[float] | NDArray[np.float64]
 """Joint coordinates of a linkage (m, rad)."""

@@ -39,6 +39,8 @@ def test_every_shipped_scene_runs_in_c(tmp_path, name):
 def test_every_hold(tmp_path, hold):
     """Of samples that are late and lost, and beside them of some that are in time."""
     kind = "downsampling" if HOLDS[hold].downsamples and hold != "model" else "hold"
+    if hold == "reaction":  # of a hand
+        kind = "holds.'hand.F -> virtual_mechanism.F_hand'"
     options = [f"{kind}={hold}", "graphics.rate=60", "duration=0.3"]
     # Gradients are those of the graphics copy.
     scene, port = ("closed-loop-direct", "virtual_mechanism.x")

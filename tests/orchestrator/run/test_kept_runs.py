@@ -48,8 +48,8 @@ KEYS: dict[str, list[str]] = {
 DIVERGES = ("graphics.rate=4", "duration=2.0", "controller.teleoperation.stiffness=[9e4, 9e4, 9e2]")
 BURSTS = ("hand.wrench=[1e308, 0.0, 0.0]",)
 """The next run of the same FMUs after a doStep that failed."""
-ENDS_AT_ONCE = ("linkage.operational_point={ body = 'link2', at = [0.9, 0.0] }",)
-"""Out of the device's workspace."""
+OUTSIDE = ("linkage.operational_point={ body = 'link2', at = [0.9, 0.0] }",)
+"""The start."""
 TIMES = ("timings", "run_time_s")
 AT = "at=[{{ time = 0.05, set = {{ 'hand.wrench' = [{}, 0.0, 0.0] }} }}]"
 
@@ -93,7 +93,7 @@ def drawn(generator: random.Random) -> tuple[str, ...]:
 def test_points_in_any_order_are_those_of_single_runs(seed: int, tmp_path: Path) -> None:
     generator = random.Random(seed)
     points = [drawn(generator) for _ in range(12)]
-    points += [(*BASE, *DIVERGES), (*BASE, *ENDS_AT_ONCE), (*BASE, "graphics.rate=-1")]
+    points += [(*BASE, *DIVERGES), (*BASE, *OUTSIDE), (*BASE, "graphics.rate=-1")]
     points += [(*BASE, *BURSTS), (*BASE, "hold=lead", *BURSTS), BASE, (*BASE, "hold=lead")]
     points = generator.sample(2 * points, 2 * len(points))
     with nothing_kept():
@@ -106,7 +106,7 @@ def test_points_in_any_order_are_those_of_single_runs(seed: int, tmp_path: Path)
     }
     assert "fault" in str(ends[(*BASE, *BURSTS)])
     assert "diverged" in str(ends[(*BASE, *DIVERGES)])
-    assert ends[(*BASE, *ENDS_AT_ONCE)] == {"reason": "stop_when", "time": 0.0}
+    assert ends[(*BASE, *OUTSIDE)] == {"reason": "fault", "time": 0.0}
 
 
 @pytest.mark.parametrize("scene", ["closed-loop", "serial", "enclosure", "two-users"])

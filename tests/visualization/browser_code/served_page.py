@@ -20,7 +20,7 @@ extends = "parallelogram"
 title = "Parallelogram at a device"
 hold = "zoh"
 graphics.rate = 30
-device.base_x = 0.27
+device.base = [0.275, 0.0]
 controller.bias = "full"
 """
 """One closed-loop mechanism with one free direction, at right angles to its rockers."""
