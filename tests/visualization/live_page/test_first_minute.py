@@ -215,10 +215,17 @@ def test_the_hold_model_begins_anew_and_ends_the_vibration_at_a_slow_rate(
     served: Served, window: Callable[..., Page]
 ) -> None:
     """The page says then what is so with it: why, and no remedy of gains that it counts with."""
+    pressed = "document.getElementById('remedy').ariaPressed === 'true'"
+    before = window(served.url)
+    before.until("!document.getElementById('first').hidden")
+    if before.get(pressed):  # as another test has left it
+        before.page.click("#remedy")
+        before.until(f"!({pressed})")
+    before.page.close()
     page = window(f"{served.url}#graphics.rate=11")
     page.until("document.getElementById('hertz').textContent === '11 Hz'")
     page.page.click("#remedy")
-    page.until("document.getElementById('remedy').ariaPressed === 'true'")
+    page.until(pressed)
     why = "document.getElementById('why').textContent"
     assert "where the linkage was" in page.get(why)
     page.page.click("#more summary")
