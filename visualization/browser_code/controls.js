@@ -24,7 +24,7 @@ const titled = (gain) => {
 
 // By the first part of the keys of controls: the group in which they are, in the order of the page.
 const GROUPS = {
-  linkage: "Hand", graphics: "Rate", controller: "Controller", holds: "Holds, between the rates", gains: "Gains",
+  linkage: "Hand", graphics: "Rate", controller: "Controller", model: "Holds, between the rates", holds: "Holds, between the rates", gains: "Gains",
   jitter: "Expert: jitter, delays", delays: "Expert: jitter, delays",
 };
 const LEFT = -1.05; // of a gain's slider: 0, then 0.1 to 10 times the scene's value
@@ -62,10 +62,20 @@ export class Controls {
   }
 
   controller({ key }) {
+    this.checkbox(key, "Topology controller: render the constrained directions");
+  }
+
+  model({ key, only_at_start }) {
+    const how = only_at_start ? `not in this file: make one with ${only_at_start}` : "begins anew at t = 0";
+    this.checkbox(key, `Hold model, where a connection can have it (${how})`).disabled = Boolean(only_at_start);
+  }
+
+  checkbox(key, title) {
     const input = Object.assign(document.createElement("input"), { type: "checkbox" });
-    this.labelled(key, "Topology controller: render the constrained directions", input);
+    this.labelled(key, title, input);
     input.addEventListener("change", () => this.send(set(key, input.checked)));
     this.updates[key] = ({ value }) => { input.checked = value; };
+    return input;
   }
 
   linkage(control) {

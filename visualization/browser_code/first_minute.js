@@ -30,9 +30,10 @@ export function felt(vibration, force, watched, ended) {
   return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
 }
 
-// Why, of the control of the rate.
-export const why = ({ value, max }) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
-the force on the hand ${Math.round(max)} times a second. In between, that force uses where the linkage was. A late force can feed a swing that it should damp.`;
+// Why, of the control of the rate, and whether the linkage's steps are taken when they begin.
+export const why = ({ value, max }, early) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
+the force on the hand ${Math.round(max)} times a second. In between, that force uses ${early ? "where the linkage goes: its step is computed when it begins."
+  : "where the linkage was. A late force can feed a swing that it should damp."}`;
 
 export class FirstMinute {
   // `send` is given what is changed.
@@ -74,8 +75,9 @@ export class FirstMinute {
     const now = of.get(rate.key), place = rates.findLastIndex((hertz) => hertz <= now.value);
     if (!this.slider.matches(":active")) this.slider.value = Math.max(place, 0);
     this.hertz.textContent = this.slider.ariaValueText = now.value ? `${+now.value.toPrecision(3)} Hz` : "varying";
+    this.remedy.hidden = !softer.length || !softer.every(({ key }) => of.has(key)); // the hold model counts with these gains
     this.remedy.ariaPressed = softer.every(({ key, value }) => of.get(key)?.value === value);
-    this.why.textContent = why(now);
+    this.why.textContent = why(now, controls.some(({ value }) => value === "ahead"));
   }
 
   // A frame of the run that is shown, at its time (s), and whether that has ended.

@@ -49,8 +49,14 @@ export class Program {
     if (type === "hand") return this.pull(message.user ?? "", message.at);
     if (type !== "set") throw new Error(`there is no message ${type}`);
     if (!(key in this.start)) throw new Error(`there is no control ${key}`);
+    if (this.start[key].only_at_start) throw new Error(`${key} = ${value}: make a file with ${this.start[key].only_at_start}`);
+    const before = { ...this.changed };
     this.changed[key] = value;
-    this.act(together(key));
+    try { this.act(together(key)); } catch (error) {
+      delete this.changed[key];
+      Object.assign(this.changed, before);
+      throw error;
+    }
   }
 
   // Carries out what is set of a control.
@@ -79,6 +85,10 @@ export class Program {
     if (changed[RATE] === own) delete changed[RATE];
     const { [RATE]: rate, jitter = 0 } = changed;
     if (!rate && !own) throw new Error("the rate varies in this scene: set the rate first");
+    const shortest = (1 - jitter) / (rate ?? own), late = this.data.result_after;
+    if ((rate || jitter) && shortest < late * (1 - 1e-9)) {
+      throw new Error(`steps would be down to ${+shortest.toPrecision(6)} s, and the result of one is there after ${late} s (computing_time)`);
+    }
     this.c.rate(this.m, rate ?? (jitter ? own : 0), jitter);
   }
 

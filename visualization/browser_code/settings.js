@@ -46,9 +46,12 @@ function messagesOfKey(key, text, controls) {
   return able.map((control) => set(control.key, valueOf(text, control)));
 }
 
-// What an address says of controls that are not as at the `start`; one key where all connections have the same.
+// What an address says of controls that are not as at the `start`; one key where all connections have the same. Holds that
+// a run has by the control of the hold model alone come with it.
 export function differing(controls, start) {
-  const found = changes(controls, start).map(({ key, value }) => [key, key.startsWith("gains.") ? +value.toPrecision(3) : value]);
+  const able = new Map(start.map(({ key, choices }) => [key, choices]));
+  const own = changes(controls, start).filter(({ key, value }) => able.get(key)?.includes(value) ?? true);
+  const found = own.map(({ key, value }) => [key, key.startsWith("gains.") ? +value.toPrecision(3) : value]);
   for (const kind of ["hold", "delay"]) {
     const own = found.filter(([key]) => key.startsWith(`${kind}s.`)), [first] = own;
     const every = controls.filter(({ key }) => key.startsWith(`${kind}s.`)).length;

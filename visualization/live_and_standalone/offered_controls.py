@@ -19,6 +19,11 @@ from hapticlink.orchestrator.system.changes import (
 )
 from hapticlink.orchestrator.system.springs import find_limited_gains
 from hapticlink.orchestrator.system.system import System
+from hapticlink.visualization.live_and_standalone.choose_model import (
+    MODEL,
+    can_have_model,
+    has_model,
+)
 from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
 
 GAINS = (HAND, CONTROLLER)
@@ -55,6 +60,9 @@ class Offered:
         ranges: Mapping[str, tuple[float, float]] = RANGES,
     ) -> None:
         self._linkage = scene.linkage
+        model = has_model(scene)
+        self.model = model if model or can_have_model(scene, system) else None
+        """Whether the hold `model` is chosen, None where the scene cannot have it."""
         self.gains = _gains(scene, system)
         self.holds = choices_of_slower(system) if holds is None else holds
         fmus = [f for f in system.fmus if f.clock == CLOCK]
@@ -79,6 +87,8 @@ class Offered:
             controls += [rate, {"key": JITTER, "value": 0.0}]
         if self.topology:
             controls.append({"key": RENDERED, "value": True})
+        if self.model is not None:
+            controls.append({"key": MODEL, "value": self.model})
         for name, choices in self.holds.items():
             words = _title(labels.connection(name))
             controls += [

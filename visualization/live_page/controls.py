@@ -15,6 +15,7 @@ from hapticlink.orchestrator.system.changes import OPERATIONAL_POINT, choices_be
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     CLOCK,
     JITTER,
+    MODEL,
     RATE,
     RENDERED,
     Offered,
@@ -36,10 +37,18 @@ class Controls:
         self._known = [control["key"] for control in self.described()]
         self._pulling = {user: False for user in users(live.scene)}
 
-    def restore(self) -> None:
-        """Apply the settings of the page to a run that has just begun."""
+    def restore(self) -> list[str]:
+        """Apply the settings of the page to a run that has just begun, and forget those that it
+        cannot have; why, of each."""
+        refused = {k: "there is no such control" for k in self._settings if k not in self._known}
         for key in dict.fromkeys(_together(key) for key in self._settings if key in self._known):
-            self._act(key)
+            try:
+                self._act(key)
+            except InputFault as fault:
+                refused |= {k: str(fault) for k in self._settings if _together(k) == key}
+        for key in refused:
+            del self._settings[key]
+        return [f"{key} is as in the scene: {why}" for key, why in refused.items()]
 
     def described(self) -> list[dict[str, Any]]:
         """The controls, as JSON has them."""
@@ -63,6 +72,8 @@ class Controls:
     def _act(self, key: str) -> None:
         """Carry out what is set of a control."""
         kind, _, name = key.partition(".")
+        if key == MODEL:
+            return  # a run begins with it
         if key == RATE:
             self._change_rate()
         elif key == OPERATIONAL_POINT:

@@ -9,7 +9,11 @@ from typing import Annotated, Literal
 
 from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
 
-from hapticlink.visualization.live_and_standalone.offered_controls import RANGES, RENDERED
+from hapticlink.visualization.live_and_standalone.offered_controls import (
+    MODEL,
+    RANGES,
+    RENDERED,
+)
 
 STRICT = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -48,7 +52,7 @@ class SetControl:
             low, high = RANGES[kind]
             if not (isinstance(value, float) and low <= value <= high):
                 raise ValueError(f"{self.key} = {value!r}: give a number from {low:g} to {high:g}")
-        elif not isinstance(value, bool if self.key == RENDERED else str):
+        elif not isinstance(value, bool if self.key in (RENDERED, MODEL) else str):
             raise ValueError(f"{self.key} = {value!r}: is of another type")
 
 

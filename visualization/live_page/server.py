@@ -28,6 +28,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from hapticlink.visualization.browser_code.one_file import PAGE, headers
+from hapticlink.visualization.live_and_standalone.choose_model import MODEL
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.server_pipe import (
     ChildProcess,
@@ -65,6 +66,7 @@ class Pages:
         self._newest: dict[str, dict[str, Any]] = {}
         self._second: ChildProcess | None = None
         self._newest_of_second: dict[str, dict[str, Any]] = {}
+        self._begins_first = False  # a run that the second one has to begin with
         self._stability = StabilityProcess(self.show)
         self._files = {p.name: p for p in PAGE.iterdir() if p.suffix in TYPES}
 
@@ -81,6 +83,9 @@ class Pages:
             self._picture = message.pop("picture")
         elif kind == "scene":
             runs = 2 if self._second else 1
+            if self._second and self._begins_first:
+                self._second.send(messages.Time("time", "reset"))
+            self._begins_first = False
             message = self._newest["opening"] | message | {"runs": runs}
             self._holding = {user: self._holding.get(user) for user in message["users"]}
         elif kind == "frame" and self._picture:
@@ -121,7 +126,7 @@ class Pages:
         """Begin a second run with the settings of the first, or end it."""
         if on and not self._second and (first := self._newest.get("settings")):
             module, root = self._second_run
-            self._second = ChildProcess(module, root, first["scene"], first["settings"])
+            self._second = ChildProcess(module, root, first["given"], first["settings"])
             self._broadcast("refused", {"type": "refused", "why": "the second run begins"})
         elif not on and self._second:
             asyncio.get_running_loop().run_in_executor(None, self._second.end)
@@ -189,6 +194,11 @@ class Pages:
             write_message(self._out, message)
         if self._second and (of_second or not isinstance(message, messages.SetControl)):
             self._second.send(message)
+        if isinstance(message, messages.SetControl) and message.key == MODEL:
+            if of_second:
+                self._newest_of_second.pop("scene", None)  # both begin anew with the next one
+            else:
+                self._begins_first = True
 
 
 def _response(status: HTTPStatus, file: Path | None = None) -> Response:

@@ -18,7 +18,9 @@ from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.scene.blocks import described_devices, driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization.live_and_standalone import first_messages
+from hapticlink.visualization.live_and_standalone.choose_model import MODEL, has_model, with_model
 from hapticlink.visualization.live_and_standalone.offered_controls import Settings, target
 from hapticlink.visualization.live_and_standalone.viewed_scene import pack_scene, simulated
 from hapticlink.visualization.live_page import messages
@@ -64,9 +66,10 @@ class LiveSession:
         settings: Settings | None = None,
         paused: bool = False,
     ) -> None:
-        self._scene, self._link, self._root, self._real_time = scene, link, root, real_time
+        self._given, self._link, self._root, self._real_time = scene, link, root, real_time
         self._controls: Controls | None = None
         self._settings = settings or {}
+        self._scene = with_model(scene, self._settings.get(MODEL))
         self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
@@ -123,10 +126,15 @@ class LiveSession:
                 continue
             assert isinstance(message, messages.Hand | messages.SetControl)
             try:
-                self._controls.apply(message)
+                if isinstance(message, messages.SetControl) and message.key == MODEL:
+                    self._choose_model(bool(message.value))
+                else:
+                    self._controls.apply(message)
             except InputFault as fault:
                 self._refuse(message, fault)
             changed = changed or not isinstance(message, messages.Hand)
+        if self._again:
+            live.stop()
         if changed:
             self._tell_controls()
         self._require_server()
@@ -140,18 +148,40 @@ class LiveSession:
         assert self._controls
         if isinstance(message, messages.SetControl) and self._controls.begins_with(message):
             connection, hold = message.key.removeprefix("holds."), message.value
-            self._scene = open_scene.load(self._scene, {f'holds."{connection}"': hold})
+            self._begin_with(open_scene.load(self._given, {f'holds."{connection}"': hold}))
             self._say("refused", why=f"{hold} begins at t = 0: it runs in Python")
             self._anew(self._state["recording"] and "again")
+
+    def _choose_model(self, wanted: bool) -> None:
+        """Begin anew with the hold `model`, or without it, and with the scene's other holds. Raises
+        InputFault where no such scene can run; this run goes on then."""
+        if wanted == has_model(self._scene):
+            return
+        how = "with" if wanted else "without"
+        self._say("refused", why=f"{how} the hold model the run begins at t = 0, once it is built")
+        with build_system(with_model(self._given, wanted)):
+            pass
+        for key in [key for key in self._settings if key.startswith("holds.")]:
+            del self._settings[key]
+        self._settings[MODEL] = wanted
+        self._begin_with(self._given)
+        self._anew(self._state["recording"] and "again")
+
+    def _begin_with(self, given: Scene) -> None:
+        """Run another scene from the next start on, with the hold that is chosen."""
+        self._given, self._scene = given, with_model(given, self._settings.get(MODEL))
 
     def _start(self, live: LiveRun) -> None:
         self._before.close()
         self._frames, self._controls = FrameReader(live), Controls(live, self._settings)
-        self._controls.restore()
+        if whys := self._controls.restore():
+            self._say("refused", why="; ".join(whys))
         scene = self._scene
         at = self._frames.handles(live)
         self._held = {target(user): at[user] for user in at if not driver_of(scene, user)}
-        self._packed = pack_scene(simulated(scene))
+        self._packed, self._packed_given = (
+            pack_scene(simulated(each)) for each in (scene, self._given)
+        )
         self._link.send(first_messages.describe_viewed_run(scene, live.system, live.energies()))
         self._tell_controls()
         if self._state["paused"]:
@@ -175,9 +205,8 @@ class LiveSession:
                 self._anew(None if self._state["recording"] else "new")
 
     def _anew(self, recording: str | None) -> None:
-        """End this run, and begin one at t = 0."""
+        """Begin a run at t = 0 once the messages are read that came with this one."""
         self._state["recording"], self._again = recording, True
-        self._live.stop()
 
     def _wait(self, result: Any) -> None:
         """Say how a run has ended by itself, and wait for a reset or recording. What is changed
@@ -203,7 +232,8 @@ class LiveSession:
         assert self._controls
         self._say("controls", controls=self._controls.described())
         parameters = self._controls.parameters() | self._held
-        self._say("settings", scene=self._packed, settings=self._settings, parameters=parameters)
+        about = {"scene": self._packed, "given": self._packed_given, "settings": self._settings}
+        self._say("settings", **about, parameters=parameters)
 
     def _tell(self, **state: Any) -> None:
         self._state |= state

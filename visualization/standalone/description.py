@@ -10,12 +10,16 @@ import casadi as ca
 
 from hapticlink.orchestrator.base.signal_names import CHOSEN_POINT, MECHANISM_ENERGY
 from hapticlink.orchestrator.scene.blocks import described_devices
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.system.changes import result_after
 from hapticlink.programs.page_program import Drawing
 from hapticlink.programs.ports import Port
 from hapticlink.programs.prepared_changes import LEAST_RATE, MOST_DELAY
 from hapticlink.programs.resolve_scene import Resolved
 from hapticlink.visualization.live_and_standalone import first_messages
+from hapticlink.visualization.live_and_standalone.choose_model import MODEL, options
 from hapticlink.visualization.live_and_standalone.offered_controls import (
+    CLOCK,
     RANGES,
     Offered,
     stiffness,
@@ -59,7 +63,8 @@ class PageDescription:
             "name": name,
             "scene": first_messages.describe_viewed_run(scene, system, program.meters)
             | first_messages.describe_picture(picture),
-            "controls": offered.described({}),
+            "controls": [*_controls(offered, scene)],
+            "result_after": result_after(system, CLOCK),
             "topology": offered.topology,
             "hands": hands,
             "point": CHOSEN_POINT,
@@ -79,6 +84,15 @@ class PageDescription:
             "n_drawn": self.drawing.function.nnz_out(),
             "tables": [{"columns": _columns(program, clock)} for clock in program.tables],
         }
+
+
+def _controls(offered: Offered, scene: Scene) -> Iterator[dict[str, Any]]:
+    """The controls as a program has them, whose plan is that of the start."""
+    for control in offered.described({}):
+        if control["key"] == MODEL:
+            changed = options(scene, not control["value"])
+            control["only_at_start"] = " ".join(f"--set {option}" for option in changed)
+        yield control
 
 
 def _places(program: Resolved) -> Places:

@@ -5,7 +5,9 @@ import json
 import pytest
 
 import hapticlink as hl
-from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Settings
+from hapticlink.orchestrator.system.build_system import build_system
+from hapticlink.visualization.live_and_standalone.choose_model import with_model
+from hapticlink.visualization.live_and_standalone.offered_controls import RATE, Offered, Settings
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.messages import Hand, SetControl, Time, newest, parse
 from tests.api.test_real_time import ENERGY, ran
@@ -87,6 +89,46 @@ def test_the_hand_takes_another_point_that_the_scene_names() -> None:
     assert held == [1.0, 0.0, 2.0]
 
 
+HELD = "holds.virtual_environment.P_c -> controller.P_c"
+
+
+def test_settings_that_a_run_cannot_begin_with_are_forgotten_and_said() -> None:
+    """So a run begins that was chosen beside them."""
+    settings: Settings = {"gains.other": 2.0, HELD: "ahead", "jitter": 0.1}
+    said: list[str] = []
+
+    def turn(live: hl.RealTime) -> None:
+        said.extend(Controls(live, settings).restore())
+        live.stop()
+
+    ran("closed-loop-ideal", turn)
+    assert settings == {"jitter": 0.1}
+    assert [line.partition(" is as in")[0] for line in said] == ["gains.other", HELD]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "chosen"),
+    [
+        ("closed-loop-ideal", {}, False),
+        ("closed-loop-ideal", {"hold": "model"}, True),
+        ("closed-loop-ideal", {"graphics.sync": "operational"}, None),
+        ("closed-loop-ideal", {"directions_from": "mechanism"}, None),
+        ("closed-loop-direct", {}, False),
+        ("closed-loop-direct", {"coupling": "gauss-seidel-plants"}, None),
+    ],
+)
+def test_the_hold_model_is_offered_where_its_premises_hold(
+    name: str, options: dict[str, object], chosen: bool | None
+) -> None:
+    """There a scene that begins with it has it on a connection, and without it on none."""
+    scene = hl.scene(name, options | {"packaging": "python"})
+    with build_system(scene) as system:
+        assert Offered(scene, system).model is chosen
+    for wanted in (True, False) if chosen is not None else ():
+        with build_system(with_model(scene, wanted)) as system:
+            assert bool({"model", "ahead"} & {c.hold for c in system.connections}) is wanted
+
+
 def test_a_pull_is_read() -> None:
     assert parse('{"type": "hand", "at": [0.1, -0.2]}') == Hand("hand", (0.1, -0.2))
     other = '{"type": "hand", "at": null, "user": "left"}'
@@ -124,6 +166,7 @@ def test_a_pull_is_read() -> None:
         '{"type": "set", "key": "delays.a", "value": 2}',
         '{"type": "set", "key": "gains.controller.K_pc", "value": -1}',
         '{"type": "set", "key": "controller.topology", "value": 1}',
+        '{"type": "set", "key": "model", "value": "model"}',
         '{"type": "set", "key": "holds.a", "value": 1}',
         '{"type": "set", "key": "holds.a", "value": null}',
         '{"type": "time", "do": "stop"}',

@@ -15,7 +15,7 @@ from scipy.signal import butter, sosfiltfilt
 import hapticlink as hl
 from hapticlink.visualization.live_and_standalone.offered_controls import RATE
 from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
-from tests.visualization.browser_code.chromium import Page, has_its_first_minute
+from tests.visualization.browser_code.chromium import COLLECT, Page, has_its_first_minute, shaken
 from tests.visualization.browser_code.javascript import javascript
 from tests.visualization.browser_code.served_page import Served
 from tests.visualization.live_page.viewed_controls import begun, judged, set_by
@@ -209,3 +209,43 @@ def test_each_control_of_the_first_minute_has_a_name(
     assert page.get("document.getElementById('slow').ariaValueText") == "30 Hz"
     ids = page.get("[...document.querySelectorAll('[id]')].map((each) => each.id)")
     assert len(ids) == len({*ids})
+
+
+def test_the_hold_model_begins_anew_and_ends_the_vibration_at_a_slow_rate(
+    served: Served, window: Callable[..., Page]
+) -> None:
+    """The page says then what is so with it: why, and no remedy of gains that it counts with."""
+    pressed = "document.getElementById('remedy').ariaPressed === 'true'"
+    before = window(served.url)
+    before.until("!document.getElementById('first').hidden")
+    if before.get(pressed):  # as another test has left it
+        before.page.click("#remedy")
+        before.until(f"!({pressed})")
+    before.page.close()
+    page = window(f"{served.url}#graphics.rate=11")
+    page.until("document.getElementById('hertz').textContent === '11 Hz'")
+    page.page.click("#remedy")
+    page.until(pressed)
+    why = "document.getElementById('why').textContent"
+    assert "where the linkage was" in page.get(why)
+    page.page.click("#more summary")
+    page.page.check("[data-control='model']")
+    page.until(f"{why}.includes('where the linkage goes')")
+    page.until("view.refused?.includes('gains.controller.K_pc is as in the scene')")
+    assert not page.page.is_visible("#remedy")
+    held = "document.querySelector(\"[data-control$='x -> controller.x_S']\").value"
+    assert page.get(held) == "ahead"
+    page.until("location.hash === '#graphics.rate=11&model=true'")
+    page.until("view.frame?.t < 1")
+    page.page.evaluate(COLLECT)
+    page.pull(0.006, 0.012)
+    page.until("view.frame?.t > 4")
+    assert shaken(page.get("view.seen")) < 0.2
+    page.page.mouse.up()
+    linked = window(page.get("location.href"))
+    linked.until("document.querySelector('[data-control=\"model\"]').checked")
+    linked.page.close()
+    page.page.click("#restore")
+    page.until("location.hash === ''")
+    assert page.get(held) == "zoh"
+    assert page.page.is_visible("#remedy")

@@ -4,6 +4,9 @@ import os
 import signal
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 from tests.visualization.browser_code.chromium import Page, differ_without_topology
 from tests.visualization.browser_code.served_page import Served, values
@@ -62,6 +65,32 @@ def test_a_second_run_gets_its_changes_alone_and_leaves_no_process(served: Serve
         window.send(type="compare", on=False)
         window.until(lambda new: "b" not in new["frame"] and new.get("scene", {}).get("runs") == 1)
         window.until(lambda new: not second_runs(served))
+
+
+def test_both_begin_anew_where_one_begins_with_the_hold_model(served: Served) -> None:
+    """Else the other run would be ahead for good, by more than the half second that is waited."""
+    with served.window() as window:
+        window.until(lambda new: "controls" in new)
+        window.send(type="compare", on=True)
+        for b in (True, False):
+            window.until(lambda new: min(_times(new)) > 0.5)
+            window.set("model", True, b=b)
+            window.until(lambda new, b=b: _has_model(new, b) and np.ptp(_times(new)) < 0.25)
+            assert _has_model(window.newest, not b) is not b
+        window.send(type="compare", on=False)
+        window.until(lambda new: not second_runs(served) and new["scene"].get("runs") == 1)
+        window.set("model", False)
+        window.until(lambda new: not _has_model(new, False))
+
+
+def _times(new: dict[str, Any]) -> tuple[float, float]:
+    return new["frame"]["t"], new["frame"].get("b", {"t": -1.0})["t"]
+
+
+def _has_model(new: dict[str, Any], b: bool) -> bool:
+    controls = values(new["controls"].get("b", {}) if b else new["controls"])
+    held = controls.get("holds.virtual_environment.P_c -> controller.P_c")
+    return bool(controls.get("model")) and held == "model"
 
 
 def test_which_of_both_runs_has_diverged_is_said(served: Served) -> None:

@@ -21,7 +21,7 @@ from tests.visualization.browser_code.chromium import (
     differ_without_topology,
     has_its_first_minute,
 )
-from tests.visualization.browser_code.javascript import NODE
+from tests.visualization.browser_code.javascript import NODE, javascript
 from tests.visualization.live_page.test_controls import POINTS
 
 BYPASS_CSP = False
@@ -237,3 +237,33 @@ def test_a_drag_is_heard_once_it_is_asked_for(file: Path, window: Window) -> Non
 def test_the_benchmark_runs_a_page_in_every_form(browser: Any) -> None:
     _, _, *forms = bench._measured("pendulum", (), 1, browser)
     assert min(forms) > 1  # times real time: by FMUs, under node and in Chromium
+
+
+PREPARED = """
+  const changed = {}, told = [], c = { rate: (m, ...rate) => told.push(rate) };
+  const made = { changed, start: given.start, data: given, c };
+  Object.setPrototypeOf(made, Program.prototype);
+  const set = (key, value) => {
+    try { made.apply({ type: "set", key, value }); } catch (error) { return error.message; }
+    return "";
+  };
+  answer = [given.asked.map((each) => set(...each)), told, changed];
+"""
+
+
+def test_steps_in_a_file_leave_time_for_the_result_and_are_taken_as_at_the_start() -> None:
+    """What is refused is not kept, as with a server."""
+    start = {
+        "graphics.rate": {"value": 16.0},
+        "jitter": {"value": 0.0},
+        "model": {"value": True, "only_at_start": "--set hold=zoh"},
+    }
+    asked = [("graphics.rate", 50.0), ("jitter", 0.2), ("graphics.rate", 40.0), ("jitter", 0.2)]
+    asked += [("graphics.rate", 45.0), ("model", False)]
+    given = {"start": start, "result_after": 0.02, "asked": asked}
+    refused, told, kept = javascript("program.js", PREPARED, given)
+    early, late = "there after 0.02 s (computing_time)", "make a file with --set hold=zoh"
+    assert [bool(line) for line in refused] == [False, True, False, False, True, True]
+    assert [early in refused[1], early in refused[4], late in refused[5]] == [True] * 3
+    assert told == [[50.0, 0.0], [40.0, 0.0], [40.0, 0.2]]
+    assert kept == {"graphics.rate": 40.0, "jitter": 0.2}
