@@ -37,7 +37,7 @@ CODE_LINES = {
     "analysis": 8890,
     "visualization": 3676,
     "api": 635,
-    "commands": 1606,
+    "commands": 1613,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
