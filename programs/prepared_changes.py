@@ -152,6 +152,7 @@ def _family(machine: Machine, simulation: Simulation, plan: Plan, event: Event) 
     if len(sizes) > 1:
         return None
     (n,) = sizes
+    machine.publish()
     every = [(structures.Op * n).from_address(_op(machine, first)) for first, _ in blocks]
     slopes = []
     for one, two, four in zip(*every, strict=True):

@@ -217,6 +217,7 @@ def _resolve(
         every = instructions(plan.block(event), simulation)
         kinds[event] = machine.block([i for i in every if getattr(i, "fmu", "") != outside])
     possible = prepare_changes(machine, simulation, plan, kinds) if changing else NONE
+    machine.publish()
     left = machine.in_python.items()
     refusals.refuse(scene.title, (f"{operation}: {why}" for operation, why in left))
     events = EventData(system.timeline, kinds, possible)

@@ -33,7 +33,7 @@ CODE_LINES = {
     "components": 7456,
     "fmus": 2991,
     "orchestrator": 16342,
-    "programs": 1023,
+    "programs": 1025,
     "analysis": 8888,
     "visualization": 3601,
     "api": 635,
