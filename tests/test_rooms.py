@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7456,
     "fmus": 2991,
-    "orchestrator": 16342,
-    "programs": 1025,
-    "analysis": 8888,
-    "visualization": 3601,
+    "orchestrator": 16389,
+    "programs": 1027,
+    "analysis": 8889,
+    "visualization": 3603,
     "api": 635,
-    "commands": 1606,
+    "commands": 1605,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
