@@ -94,7 +94,7 @@ class Meter:
         self.take_rows()
         self.c.fill(full=saved["full"], least=saved["least"])
 
-    def energy(self, seconds: float, begin: float) -> Energy:
+    def energy(self, seconds: float, begin: float = 0.0) -> Energy:
         """The energies until now; `seconds` is the length of a tick, `begin` the time of the first
         (s)."""
         found = np.zeros(5)
