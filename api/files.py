@@ -104,7 +104,7 @@ def export(scene: str | Path | Scene, options: Options = (), *, out: str | Path)
     """
     from hapticlink.orchestrator.ssp import write  # its XML parsers are slow to load
 
-    read = open_scene.load(scene, options)
+    read = open_scene.load(scene, options, takes=("start_time",))
     with build_system(read, _starts(read)) as system:
         for line in uneven(system.timeline):
             logging.getLogger(__name__).warning(line)

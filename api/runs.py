@@ -101,7 +101,7 @@ def run(
     is, and Ctrl-C ends the runs of the main thread.
     """
     drawn = figure_files.formats(format) if figures else ()
-    read = open_scene.load(scene, options, resumes=True)
+    read = open_scene.load(scene, options, takes=open_scene.BEGINNINGS)
     if device is not None:
         read = open_scene.load(read, with_board(device))
     if real_time:
@@ -210,7 +210,7 @@ def _write_files(ended: Experiment, figures: Sequence[str]) -> Iterator[list[str
     """Writes the plan of a run that had a step, and then its figures; the names of the files, none
     at first. Raises Interrupted and OSError."""
     yield []
-    if ended.outcome.end_time <= 0 or ended.outcome.reason == "interrupted":
+    if ended.outcome.end_time <= ended.scene.start_time or ended.outcome.reason == "interrupted":
         return
     (ended.folder / "plan.txt").unlink(missing_ok=True)  # a link is replaced, not followed
     with (ended.folder / "plan.txt").open("x", encoding="utf-8") as file:

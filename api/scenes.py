@@ -31,12 +31,12 @@ def scene(scene: str | Path | Scene, options: Options = ()) -> Scene:
 
     Raises SceneFault with all findings at once, InputFault for an option that cannot be applied.
     """
-    return open_scene.load(scene, options, resumes=True)
+    return open_scene.load(scene, options, takes=open_scene.BEGINNINGS)
 
 
 def explain(scene: str | Path | Scene, options: Options = ()) -> list[str]:
     """The plan of a run as lines of text: which FMU steps when, and from which samples its inputs
     are computed. Raises InputFault for a scene that cannot be run.
     """
-    with build_system(open_scene.load(scene, options, resumes=True)) as system:
+    with build_system(open_scene.load(scene, options, takes=open_scene.BEGINNINGS)) as system:
         return list(explained.explain(Plan(choose_fetched(system)), explained.PRINTED))

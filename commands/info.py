@@ -61,7 +61,8 @@ def info(
         fetched = choose_fetched(system).fmu
     say(f"{read.title}\n{read.description.strip()}".strip())
     _starts(read, start)
-    say(f"\n{read.duration:g} s in ticks of {time.base} s, {read.coupling}")
+    begin = f" from {read.start_time:g} s on" if read.start_time else ""
+    say(f"\n{read.duration:g} s{begin} in ticks of {time.base} s, {read.coupling}")
     for fmu in system.fmus:
         timing = fmu.description.timing
         every, some = (len(of.description.outputs) for of in (fmu, fetched[fmu.name]))

@@ -52,13 +52,12 @@ def steps(title: str, hidden: bool = False) -> Iterator[Callable[[str, int, int]
 
 @contextmanager
 def progress(
-    title: str, duration: float, hidden: bool = False
+    title: str, end: float, hidden: bool = False
 ) -> Iterator[Callable[[float], None] | None]:
-    """Gives a function to be called with the simulated time (s); None if stderr is no terminal."""
+    """Gives a function to be called with the simulated time (s), until `end`; None if stderr is no
+    terminal."""
     with bar(title, hidden) as show:
-        yield (
-            (lambda time: show(time, duration, f"{time:.2f} of {duration:g} s")) if show else None
-        )
+        yield ((lambda time: show(time, end, f"{time:.2f} of {end:g} s")) if show else None)
 
 
 @contextmanager

@@ -145,7 +145,7 @@ def run(
             stop = shown.enter_context(stop_key()) if real_time and not output.quiet else None
             if stop and (device or driver_of(read, "")):
                 say("a key ends the run: motors are without torque then", file=sys.stderr)
-            bar = progress(read.title, read.duration, hidden=output.quiet)
+            bar = progress(read.title, read.stop_time, hidden=output.quiet)
 
             def answer(result: hl.Run) -> None:
                 """Says what it can before figures are drawn: all but the names of the files."""

@@ -157,8 +157,8 @@ def session(path: Path | str, folder: Path | None = None) -> closing[FmuSession]
     return closing(FmuSession(path, folder))
 
 
-def initialize(slave: FMU2Slave) -> None:
-    slave.setupExperiment(startTime=0.0)
+def initialize(slave: FMU2Slave, time: float = 0.0) -> None:
+    slave.setupExperiment(startTime=time)
     slave.enterInitializationMode()
     slave.exitInitializationMode()
 

@@ -63,7 +63,7 @@ class Holder:
         answers = [
             self.send("hello", ["slow", OUTPUTS, self.identity], []),
             self.send("connect", [["u"]], []),
-            self.send("enter_initialization", [1.0], []),
+            self.send("enter_initialization", [0.0, 1.0], []),
             self.send("exit_initialization", [], []),
             self.send("step", [0.0, 0.25, 0.25], [[0, struct.pack("<d", 2.0)]]),
             self.send("close", [], []),
@@ -113,7 +113,7 @@ def _case(folder: Path, draw: random.Random, states: bool) -> tuple[str, str]:
             for call, arguments in (
                 ("hello", ["slow", OUTPUTS, identity]),
                 ("connect", [["u"]]),
-                ("enter_initialization", [1.0]),
+                ("enter_initialization", [0.0, 1.0]),
                 ("exit_initialization", []),
             )[:begins]:
                 holder.send(call, arguments, [])

@@ -35,7 +35,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
     not_recorded: outputs of which an entry is not written."""
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
-    end = seconds(timeline.end)
+    end = timeline.time(timeline.end)
     held = [c for c in system.connections if c.hold]
     compiled = scene.packaging == "native" and blocks(scene).built
     packages = (*PACKAGES, "ziglang") if compiled else PACKAGES
@@ -134,7 +134,7 @@ def _find_idle_computing_time(scene: Scene, system: System) -> Iterator[str]:
 
 def _find_idle_events(scene: Scene, system: System) -> Iterator[str]:
     """Events of `[[at]]` that no step of their FMU sees."""
-    end = system.timeline.seconds(system.timeline.end)
+    end = system.timeline.time(system.timeline.end)
     for change in system.changes:
         if change.begin >= end:
             why = f"none begins before the run ends, at {end:g} s"

@@ -225,10 +225,10 @@ def _find_state(
 ) -> RunState | None:
     """The state from which a scene goes on, if it names one. Raises InputFault where it does not
     fit, and where the run would replace the results that the state belongs to."""
-    if not scene.resume:
-        return None
     if real_time:
         open_scene.require_start(scene)
+    if not scene.resume:
+        return None
     state = run_state.read(Path(scene.resume))
     require_fit(state, system, open_scene.write_tables(scene))
     if state.path.parent == folder:
@@ -254,7 +254,7 @@ def _find_saving(
     if real_time:
         raise InputFault("--save: no state of a run in real time is saved: leave one out")
     require_savable(system)
-    ticks = save.ticks(system.timeline, state.time if state else 0.0)
+    ticks = save.ticks(system.timeline, state.time if state else scene.start_time)
     return Saving(ticks, folder, open_scene.write_tables(scene))
 
 
@@ -292,7 +292,7 @@ def simulate(
     lock of the folder. save: when states are saved.
     """
     begin, folder = perf_counter(), Path(folder).absolute()  # FMUs may change the current one
-    read = open_scene.load(scene, options, resumes=True)
+    read = open_scene.load(scene, options, takes=open_scene.BEGINNINGS)
     with ExitStack() as stack:
         if not (in_memory or locked):
             stack.enter_context(folder_lock.lock_folder(folder))

@@ -3,6 +3,7 @@ or that of a run's state, which then goes on from it."""
 
 from __future__ import annotations
 
+from collections.abc import Container
 from dataclasses import replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -21,25 +22,25 @@ from hapticlink.orchestrator.scene.scene_source import Source
 
 
 def load(
-    scene: str | FilePath | Scene | Source, options: Options = (), resumes: bool = False
+    scene: str | FilePath | Scene | Source, options: Options = (), takes: Container[str] = ()
 ) -> Scene:
     """Find a scene, change it by `options` and check it.
 
     scene: the name of a shipped one, the path of a TOML file or SSP, a Scene, or a Source. A Scene
     that was read from a file is read again with its own options and the given ones; one that was
     created or changed in Python is checked. Raises SceneFault with every finding, InputFault for a
-    scene that is not found, for an option that cannot be applied, and for a scene that goes on from
-    a state, unless it is for what `resumes`.
+    scene that is not found, for an option that cannot be applied, and for a scene that begins
+    otherwise than from its start values at 0 s, by keys that are not among those that it `takes`.
     """
     further = overrides.write_options(options)
     if isinstance(scene, Scene) and scene.source and not further:
-        return scene if resumes else require_start(scene)
+        return require_start(scene, takes)
     source = scene if isinstance(scene, Source) else source_of(scene)
     source = replace(source, options=(*source.options, *further))
     if source.name.endswith((".ssp", ".xml")):
         _check_ssp(source)
     read = from_source(source)
-    return read if resumes else require_start(read)
+    return require_start(read, takes)
 
 
 def source_of(scene: str | FilePath | Scene) -> Source:
@@ -75,12 +76,22 @@ def _of(scene: Scene) -> Source:
     return Source(scene.title, tables, {})
 
 
-def require_start(scene: Scene) -> Scene:
-    """The scene. Raises InputFault for one that goes on from a state."""
-    if scene.resume:
+BEGINNINGS = ("resume", "start_time")
+"""The keys by which a scene begins otherwise than from its start values at 0 s."""
+
+
+def require_start(scene: Scene, takes: Container[str] = ()) -> Scene:
+    """The scene. Raises InputFault for one that goes on from a state, or begins at another time
+    than 0, by a key that is not among those that are taken."""
+    if scene.resume and "resume" not in takes:
         raise InputFault(
             f"resume = {scene.resume!r}: runs and sweeps alone go on from a state, and not in real "
             "time: leave it out"
+        )
+    if scene.start_time and "start_time" not in takes:
+        raise InputFault(
+            f"start_time = {scene.start_time:g}: runs, sweeps and SSPs alone begin at another time "
+            "than 0, and not in real time: leave it out"
         )
     return scene
 

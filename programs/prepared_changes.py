@@ -148,11 +148,11 @@ def _family(machine: Machine, simulation: Simulation, plan: Plan, event: Event) 
         block = plan.block(event._replace(firings=firings))
         first, last = machine.block([*instructions(block, simulation)])
         blocks.append((first, last - first))
-    machine.publish()
     sizes = {n for _, n in blocks}
     if len(sizes) > 1:
         return None
     (n,) = sizes
+    machine.publish()
     every = [(structures.Op * n).from_address(_op(machine, first)) for first, _ in blocks]
     slopes = []
     for one, two, four in zip(*every, strict=True):

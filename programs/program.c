@@ -468,7 +468,10 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean has_tolerance, fmi2R
                                fmi2Real start, fmi2Boolean has_stop, fmi2Real stop) {
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
-    if (start != 0.0) return fail(m, fmi2Error, "a scene starts at 0 s, not at %.17g s", start);
+    if (!(start >= 0.0 && start < INFINITY))
+        return fail(m, fmi2Error, "a scene starts at 0 s or later, not at %.17g s", start);
+    m->now.time = start;
+    m->now.scene.loop.begin = start * m->now.scene.loop.denominator;
     m->stop = has_stop ? stop : INFINITY;
     return fmi2OK;
 }
@@ -477,7 +480,7 @@ fmi2Status fmi2EnterInitializationMode(fmi2Component c) {
     Model *m = c;
     if (out_of_order(m, __func__, INSTANTIATED)) return fmi2Error;
     for (int i = 0; i < N_MEMBERS; i++)
-        if (members[i].setup(m->members[i], members[i].tolerance > 0.0, members[i].tolerance, 0.0,
+        if (members[i].setup(m->members[i], members[i].tolerance > 0.0, members[i].tolerance, m->now.time,
                              fmi2False, 0.0) > fmi2Warning ||
             members[i].enter(m->members[i]) > fmi2Warning)
             return fail(m, fmi2Error, "%s does not enter initialisation mode", members[i].name);
@@ -601,7 +604,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
                     "%.17g s", start, end, m->now.time);
     if (end > m->stop + NEAR * tick)
         return fail(m, fmi2Error, "a step to t = %.17g s, beyond the stop time %.17g s", end, m->stop);
-    const int64_t until = (int64_t)floor(end * l->denominator / l->numerator + NEAR);
+    const int64_t until = (int64_t)floor((end * l->denominator - l->begin) / l->numerator + NEAR);
     if (until > m->now.tick && !advance(m, until)) {
         if (m->now.mode == ENDED) {
             m->now.time = seconds(m, m->now.tick);

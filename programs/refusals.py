@@ -14,6 +14,8 @@ from hapticlink.programs.foreign import Foreign, read_foreign
 def of_scene(scene: Scene) -> None:
     """Raises InputFault for what only Python does."""
     reasons = []
+    if scene.start_time:
+        reasons.append("start_time: whoever runs the FMU gives it (setupExperiment), leave it out")
     if scene.at:
         reasons.append("[[at]]: what happens at given times is done by Python")
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]

@@ -155,7 +155,7 @@ def _settles(system: System) -> bool:
         start, values = StartValues(fmus), fmus.signals.values
         every = start.evaluations(whole_fmus(system))
         for instance in fmus.instances.values():
-            instance.enter_initialization(system.timeline.seconds(system.timeline.end))
+            instance.enter_initialization(0.0, system.timeline.seconds(system.timeline.end))
             instance.read()
         for _ in range(MOST):
             before = values.copy()

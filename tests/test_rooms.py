@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7456,
     "fmus": 2992,
-    "orchestrator": 16351,
-    "programs": 1025,
+    "orchestrator": 16398,
+    "programs": 1027,
     "analysis": 8890,
-    "visualization": 3676,
+    "visualization": 3678,
     "api": 635,
-    "commands": 1613,
+    "commands": 1612,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -18,7 +18,7 @@ def mechanism_outputs(system: System) -> dict[str, float]:
     outputs = np.zeros(len(fmu.description.outputs))
     fmu_instance = in_process(fmu.description)(MECHANISM, fmu.description, outputs, fmu.starts)
     with fmu_instance as instance:
-        instance.enter_initialization(1.0)
+        instance.enter_initialization(0.0, 1.0)
         instance.read()
     return dict(zip((s.name for s in fmu.description.outputs), outputs.tolist(), strict=True))
 

@@ -114,8 +114,7 @@ def print_lines(results: Results, name: str, known: Sequence[str] | None = None)
         yield f"  {line}"
     record = results.record
     if record.timings.run and record.end.time:  # a signal may come before the first event
-        begun = record.resumed.time if record.resumed else 0.0
-        speed = (record.end.time - begun) / record.timings.run
+        speed = (record.end.time - record.begun) / record.timings.run
         yield f"  {record.timings.run:.2f} s of run time, {speed:.1f} times real time"
     if results.folder:
         files = sorted(record.files, key=lambda name: not name.endswith(TABLES))
@@ -221,9 +220,10 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     samples, stability, and holds that did not fit."""
     record, measures = results.record, measures or Measures(results)
     if resumed := record.resumed:
+        since = record.scene.get("start_time", 0.0)
         yield (
             f"goes on from {resumed.state}, at {resumed.time:.6g} s: its rows are from then on, "
-            "energies of holds and counts from 0 s"
+            f"energies of holds and counts from {since:g} s"
         )
     else:
         yield from _start(results)

@@ -159,7 +159,7 @@ def _respond(
     with ExitStack() as stack:
         instance = LoadedFmus(alone, stack).instances[fmu.name]
         places = range(len(inputs))
-        instance.enter_initialization(LONG)
+        instance.enter_initialization(0.0, LONG)
         if once[0]:
             instance.connect(once[0], range(len(once[0])))(once[1])
         instance.connect(inputs, places)(given[0])
@@ -227,7 +227,7 @@ class LinearInstance(Instance):
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         return None
 
-    def enter_initialization(self, stop_time: float) -> None:
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Nothing to be told."""
 
     def exit_initialization(self) -> None:

@@ -73,7 +73,7 @@ def job(
     signal."""
     interrupt.raise_if_interrupted()  # 100,000 points take minutes
     try:
-        loaded = open_scene.load(scene, options, resumes=True)
+        loaded = open_scene.load(scene, options, takes=open_scene.BEGINNINGS)
         return Job(point, loaded, key(loaded), plugins=tuple(plugins.list_plugins()))
     except Fault as fault:
         return Job(point, None, refusal=str(fault))

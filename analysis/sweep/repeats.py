@@ -45,7 +45,7 @@ def seeds(scene: Scene) -> dict[str, int]:
     drawn |= {
         f"at.{i}": event
         for i, event in enumerate(scene.at)
-        if event.noise and event.time < scene.duration
+        if event.noise and event.time < scene.stop_time
     }
     return {f"{key}.seed": draw.seed for key, draw in drawn.items()}
 

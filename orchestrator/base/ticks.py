@@ -117,18 +117,36 @@ class Clock:
 @dataclass(frozen=True)
 class Timeline:
     """All clocks on one base of time. base: a tick (s). end: the last tick. clocks: the haptic one
-    first. of: the name of each FMU's clock."""
+    first. of: the name of each FMU's clock. begin: the time (s) of tick 0."""
 
     base: Fraction
     end: int
     clocks: tuple[Clock, ...]
     of: Mapping[str, str] = field(default_factory=dict)
+    begin: Fraction = Fraction(0)
 
     @cached_property
     def seconds(self) -> Callable[[float], float]:
-        """The correctly rounded time of a tick (true division of integers rounds once)."""
+        """The correctly rounded length (s) of a number of ticks (true division of integers rounds
+        once)."""
         numerator, denominator = self.base.numerator, self.base.denominator
-        return lambda tick: tick * numerator / denominator
+        return lambda ticks: ticks * numerator / denominator
+
+    @cached_property
+    def ratio(self) -> tuple[int, int, int]:
+        """Integers n, b and d, of which (n tick + b)/d is the time (s) of a tick."""
+        d = math.lcm(self.base.denominator, self.begin.denominator)
+        return int(self.base * d), int(self.begin * d), d
+
+    def time(self, tick: int, parts: int = 1) -> float:
+        """The correctly rounded time (s) at `tick`, which counts from the beginning of the run in
+        ticks, or in `parts` of one."""
+        n, b, d = self.ratio
+        return (tick * n + b * parts) / (d * parts)
+
+    def ticks_until(self, time: Fraction) -> Fraction:
+        """The ticks from the beginning of the run to a time (s)."""
+        return (time - self.begin) / self.base
 
     def points(self, clock: Clock) -> int:
         """The number of a clock's communication points within the run."""

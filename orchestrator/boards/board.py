@@ -131,7 +131,7 @@ class Board(Instance):
 
         return take
 
-    def enter_initialization(self, stop_time: float) -> None:
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
         self._stop_time = stop_time
 
     def read(self) -> None:
@@ -151,7 +151,7 @@ class Board(Instance):
         starts = tuple({**dict(self.starts), **self._given}.items())
         outputs = np.zeros(len(about.outputs))
         with in_process(about)(self.name, about, outputs, starts, self.policy) as device:
-            device.enter_initialization(0.0)
+            device.enter_initialization(0.0, 0.0)
             device.exit_initialization()
         values = {s.name: value for s, value in zip(about.outputs, outputs, strict=True)}
         self.outputs[:] = [values.get(s.name, 0.0) for s in self.description.outputs]

@@ -206,8 +206,9 @@ class InProcess(Instance):
             self._started, transfers = (scalars, setting) if self.resets else None, setting[2]
         self._carry_out(transfers, "sets")
 
-    def enter_initialization(self, stop_time: float) -> None:
-        self._call("fmi2SetupExperiment", *self._tolerance, 0.0, True, stop_time)
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        self.place.time = start_time
+        self._call("fmi2SetupExperiment", *self._tolerance, start_time, True, stop_time)
         self._set_starts()
         self._call("fmi2EnterInitializationMode")
 

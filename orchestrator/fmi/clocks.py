@@ -25,12 +25,13 @@ class FmiClock:
     interval: Fraction | None = None
     shift: Fraction = Fraction(0)
 
-    def first_after(self, time: float) -> float:
-        """The first instant shift + k interval, k = 0, 1, ..., of a periodic clock after `time`
-        (s)."""
+    def first_after(self, time: float, start: Fraction) -> float:
+        """The first instant start + shift + k interval, k = 0, 1, ..., of a periodic clock after
+        `time` (s), with the start time of the run (FMI 3.0.2 section 2.2.8)."""
         assert self.interval
-        periods = floor((Fraction(time) - self.shift) / self.interval) + 1
-        return float(self.shift + max(periods, 0) * self.interval)
+        first = start + self.shift
+        periods = floor((Fraction(time) - first) / self.interval) + 1
+        return float(first + max(periods, 0) * self.interval)
 
     def timed(self, interval: float, shift: float) -> FmiClock:
         """The clock with an interval and a shift (s), which stand for the shortest decimals."""

@@ -22,6 +22,7 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, field
+from fractions import Fraction
 from functools import partial
 from typing import Any
 
@@ -77,7 +78,7 @@ class WithEvents(InProcess):
         self.pending = Pending(np.zeros(len(self.outputs)))
         self.inputs: EventSetter | None = None
         """The newest that was called."""
-        self._clocks = self.description.clocks
+        self._clocks, self._start = self.description.clocks, Fraction(0)
         self._readings: dict[frozenset[int] | None, tuple[list[int], Vector, list[Transfer]]] = {}
         self._saved_pending: dict[int, Pending] = {}
         self.taken_over: Mapping[str, Any] | None = None
@@ -99,12 +100,13 @@ class WithEvents(InProcess):
         if not self.has_events:
             super().exit_initialization()
             return
+        self._start = Fraction(repr(self.time))
         self._clocks = tuple(self._with_interval(clock) for clock in self._clocks)
-        self._plan(0.0, {c.reference for c in self._clocks if c.kind == "changing"})
+        self._plan(self.time, {c.reference for c in self._clocks if c.kind == "changing"})
         self._fmi("ExitInitializationMode")
         self._initialized = True
         if self._iterate():
-            raise AsksToEnd(self.name, "has asked to end the simulation", 0.0)
+            raise AsksToEnd(self.name, "has asked to end the simulation", self.time)
         self._fmi(self._back)
         self.read()
         self._start_loop()
@@ -127,7 +129,7 @@ class WithEvents(InProcess):
         shift = ctypes.c_double()
         self._call("fmi3GetShiftDecimal", _one(clock.reference), 1, ctypes.byref(shift))
         if not interval > 0:
-            raise self._fault(f"clock {clock.name} has an interval of {interval:g} s", 0.0)
+            raise self._fault(f"clock {clock.name} has an interval of {interval:g} s", self.time)
         return clock.timed(interval, shift.value)
 
     def _interval(self, clock: FmiClock) -> tuple[float, int]:
@@ -201,7 +203,7 @@ class WithEvents(InProcess):
         """The first instant after `least` (s) at which a clock is due; infinity of one that is
         triggered, or has not told it."""
         if clock.kind in PERIODIC:
-            return clock.first_after(least)
+            return clock.first_after(least, self._start)
         return self.pending.planned.get(clock.reference, math.inf)
 
     def event(

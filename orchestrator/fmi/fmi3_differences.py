@@ -83,10 +83,11 @@ class InProcess3(InProcess):
         exact = {n: v for n, v in find_wide_integers(self.starts).items() if n in unconnected}
         return everything, into, self._transfers("Set", whole, everything, exact)
 
-    def enter_initialization(self, stop_time: float) -> None:
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
         if any(s.structural for s, _ in self.starts):
             self._call("fmi3EnterConfigurationMode")
             self._set_starts(structural=True)
             self._call("fmi3ExitConfigurationMode")
         self._set_starts()
-        self._call("fmi3EnterInitializationMode", *self._tolerance, 0.0, True, stop_time)
+        self.place.time = start_time
+        self._call("fmi3EnterInitializationMode", *self._tolerance, start_time, True, stop_time)

@@ -248,9 +248,9 @@ class Instance(ABC):
         the FMU does not provide them."""
 
     @abstractmethod
-    def enter_initialization(self, stop_time: float) -> None:
-        """Tell the stop time (s) and the tolerance of the description, set the start values, and
-        enter initialisation mode."""
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        """Tell the start and stop times (s) and the tolerance of the description, set the start
+        values, and enter initialisation mode."""
 
     @abstractmethod
     def exit_initialization(self) -> None:

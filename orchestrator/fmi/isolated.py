@@ -135,12 +135,12 @@ class Isolated(Instance):
         matrix: Matrix | None = self._ask("jacobian", outputs, inputs)
         return matrix
 
-    def enter_initialization(self, stop_time: float) -> None:
-        process = self._process
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        self.place.time, process = start_time, self._process
         assert process is not None
         try:
             self._answer()  # of `_load`
-            self._ask("enter_initialization", stop_time)
+            self._ask("enter_initialization", start_time, stop_time)
         except FmuFault:
             interrupt.raise_if_interrupted()  # by a signal
             raise

@@ -57,7 +57,8 @@ class ModelExchange(WithEvents):
         """The time (s) that the FMU has been told."""
         self._failed: tuple[str, int] | None = None
         self._unfit = ""
-        self._stop_time = math.inf
+        self._span = math.inf
+        """Time (s) from its start to its stop."""
         self._counts = dict.fromkeys(("solver_steps", "evaluations", "events"), 0)
 
     @property
@@ -70,9 +71,9 @@ class ModelExchange(WithEvents):
         was event mode."""
         return super().calls | (self._counts if self._counted else {})
 
-    def enter_initialization(self, stop_time: float) -> None:
-        self._stop_time = stop_time
-        super().enter_initialization(stop_time)
+    def enter_initialization(self, start_time: float, stop_time: float) -> None:
+        self._span = stop_time - start_time
+        super().enter_initialization(start_time, stop_time)
 
     def exit_initialization(self) -> None:
         super().exit_initialization()
@@ -122,7 +123,7 @@ class ModelExchange(WithEvents):
 
         self._tell = told
         tolerance = self.description.tolerance or TOLERANCE
-        longest = LONGEST * self._stop_time
+        longest = LONGEST * self._span
         return Cvode(max(n, 1), roots, derivatives, indicators, tolerance, longest)
 
     def _size(self) -> tuple[int, int]:

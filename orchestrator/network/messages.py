@@ -21,7 +21,7 @@ MOST = 1 << 20
 ARGUMENTS: Mapping[str, tuple[type, ...]] = {
     "hello": (str, list, dict),
     "connect": (list,),
-    "enter_initialization": (float,),
+    "enter_initialization": (float, float),
     "exit_initialization": (),
     "read": (),
     "step": (float, float, float),

@@ -64,7 +64,7 @@ def explain(plan: Plan, rows: int | None = None) -> Iterator[str]:
     used = ((u.tick, connections[u.connection], u.described) for u in uses(plan, max(events)))
     for (tick, target), group in groupby(used, key=lambda use: (use[0], use[1].target)):
         inputs = " ".join(f"{c.target_port}@{described}" for _, c, described in group)
-        yield f"{tick:>8}  {timeline.seconds(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
+        yield f"{tick:>8}  {timeline.time(tick):<12.9g} {events[tick]:<3} {target}: {inputs}"
     if cut:
         yield f"cut after {rows} events; a run writes them all to plan.txt"
 

@@ -93,16 +93,18 @@ class Plan:
 
 
 def _require_exact_times(system: System) -> None:
-    """Raises InputFault where the loop's times, tick numerator/(denominator substeps), would be
+    """Raises InputFault where the loop's times, of `Timeline.time` with substeps as parts, would be
     rounded more than once."""
     timeline, parts = system.timeline, max(system.coupling.substeps.values(), default=1)
     base, last = timeline.base, timeline.end + max(c.longest for c in timeline.clocks)
-    largest = max(last * parts * base.numerator, base.denominator * parts)
+    numerator, begin, denominator = timeline.ratio
+    largest = max(last * numerator + begin, denominator) * parts
     if largest >= EXACT:
+        since = f" from {float(timeline.begin):g} s on" if begin else ""
         raise InputFault(
-            f"its {timeline.end} ticks of {base} s, times {parts} substeps, are {largest:.3g} and "
-            "not below 2^53, up to which times are exact: take a shorter duration, or rates whose "
-            "periods have a longer common divisor"
+            f"its {timeline.end} ticks of {base} s{since}, times {parts} substeps, are "
+            f"{largest:.3g} and not below 2^53, up to which times are exact: take a shorter "
+            "duration, or rates whose periods have a longer common divisor"
         )
 
 

@@ -327,6 +327,12 @@ class RunRecord(RunEnding, RunSetup):
     """None of a run that goes on or was killed."""
 
     @property
+    def begun(self) -> float:
+        """The time (s) at which its rows begin; a record of an earlier version has no
+        start_time."""
+        return self.resumed.time if self.resumed else float(self.scene.get("start_time", 0.0))
+
+    @property
     def depends_on_a_clock(self) -> bool:
         """Whether another run of the scene differs: not one with the arrivals of another."""
         in_time = self.real_time is not None and "arrivals" not in self.real_time

@@ -265,11 +265,11 @@ def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> l
             with suppress(Fault):
                 begun.append((one, one.begin(stack.enter_context(ExitStack()))))
         begun = [(one, loop) for one, loop in begun if loop.goes_with(begun[0][1])]
-        begin, seconds = perf_counter(), each[0][0].system.timeline.seconds
+        begin, time = perf_counter(), each[0][0].system.timeline.time
         ended = lanes.run_side_by_side(
             [loop for _, loop in begun],
             steps,
-            lambda tick: interrupt.raise_if_interrupted(seconds(tick)),
+            lambda tick: interrupt.raise_if_interrupted(time(tick)),
         )
         share = (perf_counter() - begin) / max(len(begun), 1)
         lasted = [one for (one, _), why in zip(begun, ended, strict=True) if why is None]
@@ -294,7 +294,7 @@ def _run_events(
 
     def turn(tick: int) -> None:
         nonlocal shown
-        time = plan.system.timeline.seconds(tick)
+        time = plan.system.timeline.time(tick)
         interrupt.raise_if_interrupted(time)
         if real_time:
             real_time.turn(loop)

@@ -55,7 +55,7 @@ class FixedPoint:
         self._settings: Iteration = system.coupling.iteration
         self._signals, self._meters, self._dticks = signals, simulation.meters, operation.dticks
         self.counts = Iterations()
-        self._seconds = system.timeline.seconds
+        self._time = system.timeline.time
         connections = [c for c in system.connections if c.name in operation.connections]
         self._held = [(simulation.holds[c.name], signals.sources(c)) for c in connections if c.hold]
         names: dict[int, str] = {}
@@ -146,7 +146,7 @@ class FixedPoint:
         worst = int(np.argmax(np.where(np.isnan(shares), np.inf, shares)))
         other = "newton" if self._settings.method == "aitken" else "more iterations (most)"
         raise Unconverged(
-            f"{self._names[worst]} does not converge at t = {self._seconds(tick):.6g} s: after "
+            f"{self._names[worst]} does not converge at t = {self._time(tick):.6g} s: after "
             f"{solution.iterations} iterations ({self._settings.method}) its value at the end of "
             f"the step is {solution.point[worst]:.9g} where the FMUs give "
             f"{solution.point[worst] + solution.residual[worst]:.9g}; take a higher rate, or in "

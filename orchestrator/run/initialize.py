@@ -59,7 +59,9 @@ def initialize(
     system, instances, values = fmus.system, fmus.instances, fmus.signals.values
     for fmu in system.fmus:
         interrupt.raise_if_interrupted()
-        instances[fmu.name].enter_initialization(find_stop(system, fmu, rates_change))
+        instances[fmu.name].enter_initialization(
+            system.timeline.time(0), find_stop(system, fmu, rates_change)
+        )
     found = order() if order else StartOrder.of(fmus)
     start, every, loops = StartValues(fmus), found.every, False
     for is_loop, evaluations in found.groups:
@@ -94,11 +96,11 @@ def find_stop(system: System, fmu: Fmu, rates_change: bool) -> float:
     rates of slower clocks can change."""
     time = system.timeline
     if not fmu.sampled and fmu.name not in system.early:
-        return time.seconds(time.end)
+        return time.time(time.end)
     if rates_change and fmu.clock != time.clocks[0].name:
-        return time.seconds(time.end) + LONGEST
+        return time.time(time.end) + LONGEST
     starts = time.clock(fmu.clock).starts
-    return time.seconds(starts[bisect_right(starts, time.end)])
+    return time.time(starts[bisect_right(starts, time.end)])
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ class OperationsInPython:
             case Step(fmu):
                 self._step(instruction, tick)
             case Record(clock):
-                simulation.recorders[clock].row(simulation.seconds(tick))
+                simulation.recorders[clock].row(simulation.time(tick))
             case Save(fmu):
                 instances[fmu].save()
             case Rollback(fmu):
@@ -92,17 +92,14 @@ class OperationsInPython:
         those of a sampled block at its start. Settings that wait for the FMU come before; beside
         the loop, in real time, the step is begun only."""
         simulation, parts = self._simulation, step.parts
-        instance, base = simulation.instances[step.fmu], simulation.system.timeline.base
-
-        def seconds(ticks: int) -> float:
-            return ticks * base.numerator / (base.denominator * parts)
-
-        if instance.place.waiting <= (now := simulation.seconds(tick)):
+        instance, timeline = simulation.instances[step.fmu], simulation.system.timeline
+        if instance.place.waiting <= (now := timeline.time(tick)):
             instance.settle(now)
         begin = tick * parts + step.part * step.dticks
         sampled = simulation.system.fmu[step.fmu].sampled and parts == 1
         end = begin if sampled else begin + step.dticks
-        times = seconds(begin), seconds(end), seconds(step.dticks)
+        size = float(step.dticks * timeline.base / parts)
+        times = timeline.time(begin, parts), timeline.time(end, parts), size
         check = simulation.step_checks.get(step.fmu) if parts == 1 else None
         if clock := simulation.beside.get(step.fmu):  # what a check reads is the loop's
             simulation.sides[clock].start(instance, lambda: instance.step(*times))

@@ -131,7 +131,8 @@ def _capture(simulation: Simulation, loop: CompiledLoop) -> dict[str, Any]:
     return {
         "version": version("hapticlink"),
         "layout": _layout(),
-        "time": simulation.seconds(loop.events.next),
+        "time": simulation.time(loop.events.next),
+        "begin": str(system.timeline.begin),
         "base": str(system.timeline.base),
         "events": loop.events.saved(),
         "coupling": order_of_calls(system),

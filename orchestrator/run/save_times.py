@@ -46,10 +46,10 @@ class SaveTimes:
 
     @staticmethod
     def _tick(timeline: Timeline, begin: float, last: int, at: float | None) -> int:
-        tick = last if at is None else math.ceil(exact(at) / timeline.base)
-        if timeline.seconds(tick) > begin and tick <= last:
+        tick = last if at is None else math.ceil(timeline.ticks_until(exact(at)))
+        if timeline.time(tick) > begin and tick <= last:
             return tick
-        most = timeline.seconds(last)
+        most = timeline.time(last)
         shown = "end" if at is None else f"{at:g}"
         raise InputFault(
             f"--save {shown}: give a time after {begin:g} s, up to {most:g} s, from where on steps "
@@ -59,7 +59,7 @@ class SaveTimes:
     def _regular(self, timeline: Timeline, begin: float, last: int) -> Iterator[tuple[int, str]]:
         if self.every:
             step, n = exact(self.every), math.floor(exact(begin) / exact(self.every)) + 1
-            while (tick := math.ceil(n * step / timeline.base)) <= last:
+            while (tick := math.ceil(timeline.ticks_until(n * step))) <= last:
                 yield tick, LAST
                 n += 1
 

@@ -93,8 +93,10 @@ class Simulation(LoadedFmus):
 
     def _take_time(self) -> None:
         time = self.system.timeline
-        self.seconds, self.meters.tick_s = time.seconds, float(time.base)
-        self.loop.fill(time.base, "numerator", "denominator")
+        self.seconds, self.time = time.seconds, time.time
+        self.meters.take_time(time)
+        numerator, begin, denominator = time.ratio
+        self.loop.fill(numerator=numerator, begin=begin, denominator=denominator)
 
     def _dismiss(self) -> None:
         for instance in self.instances.values():
@@ -182,11 +184,11 @@ class Simulation(LoadedFmus):
         late, arrived = self.seconds(self.late), self.arrivals[clock]
         computing = self.sides[clock].collect(late)
         arrived.values[:] = self.seconds(tick + self.late), late, computing
-        arrived.row(self.seconds(tick))
+        arrived.row(self.time(tick))
         for name, frames in self.frames.items():
             if self.beside[name] == clock and self.pace:
                 frames.values[:] = self.remote[name].frame(self.pace.now() - self.pace.c.origin)
-                frames.row(self.seconds(tick))
+                frames.row(self.time(tick))
 
     @property
     def remote(self) -> dict[str, Remote]:

@@ -34,7 +34,7 @@ def require_fit(state: RunState, system: System, tables: Mapping[str, Any]) -> N
 def why_no_fit(state: RunState, system: System) -> Iterator[str]:
     """What keeps a system from going on from a state, and what to do."""
     saved, time = state.content, system.timeline
-    if (end := time.seconds(time.end)) <= state.time:
+    if (end := time.time(time.end)) <= state.time:
         yield f"the run ends at {end:g} s, and its time is {state.time:g} s: take a longer duration"
     if missing := [*_unpaired("FMU", saved["fmus"], system.fmu)]:
         yield from missing
@@ -49,6 +49,8 @@ def why_no_fit(state: RunState, system: System) -> Iterator[str]:
         for key, value in order_of_calls(system).items()
         if saved["coupling"][key] != value
     )
+    if saved["begin"] != str(time.begin):
+        yield "start_time is another: leave it as it was"
     yield from _why_other_clocks(state, system)
     yield from _why_other_changes(state, system)
     if not missing and {*saved["connections"]} == {*system.connection}:

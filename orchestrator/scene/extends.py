@@ -62,7 +62,7 @@ def document(
     for fmu in tables_of(data, "fmu"):
         if folder and isinstance(fmu.get("path"), str):
             fmu["path"] = str(folder / fmu["path"])
-    if folder and isinstance(data.get("resume"), str) and data["resume"]:
+    if folder and data.get("resume") and isinstance(data["resume"], str):
         data["resume"] = str(folder / data["resume"])
     for _, table in find_traces(data) if folder else ():
         table["rate"] = {"trace": str(folder / table["rate"]["trace"])}

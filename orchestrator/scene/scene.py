@@ -34,6 +34,7 @@ from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import Plain, plain
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.boards import DRIVERS as DRIVERS  # registers the drivers
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.holds import HOLDS
@@ -111,6 +112,9 @@ class Scene:
     """The report's experiment that the scene stands for; the summary lists the differences."""
     duration: Duration
     """Simulated time."""
+    start_time: Elapsed = 0.0
+    """Time at which the run begins, and which its FMUs are told: [another time than
+    0](scenarios.md#a-run-that-begins-at-another-time-than-0)."""
     resume: str = ""
     """State of a run, from which this one goes on, relative to the scene's file: [save, resume,
     branch](resume.md)."""
@@ -268,6 +272,11 @@ class Scene:
     def plain(self) -> Scene:
         """A copy of the scene without its origin."""
         return Scene(**{f.name: getattr(self, f.name) for f in fields(Scene)})
+
+    @property
+    def stop_time(self) -> float:
+        """The time (s) at which the duration is over."""
+        return float(exact(self.start_time) + exact(self.duration))
 
     @property
     def ends_when(self) -> str:

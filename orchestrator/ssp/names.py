@@ -20,7 +20,7 @@ NOT_IN_ANNOTATION = frozenset(
     (
         *("linkage", "contacts", "mechanism", "directions", "device", "controller", "hand"),
         *("sensing", "mechanism_at", "directions_from", "graphics", "fmu", "connection"),
-        *("packaging", "hands", "devices", "controllers", "local_model"),
+        *("packaging", "hands", "devices", "controllers", "local_model", "start_time"),
     )
 )
 """Keys of a scene that are contained in its FMUs and the structure."""

@@ -50,11 +50,11 @@ class _System:
         start, end, base = (
             self._number(root, key) for key in ("StartTime", "EndTime", "BaseStepSize")
         )
-        if start and exact(start):
-            self._warn(f"StartTime = {start}: a run begins at 0 s, and ends as much earlier")
         if (algorithm := root.findtext(f"{_NAMESPACE}Algorithm", "fixedStep")) != "fixedStep":
             self._warn(f"Algorithm = {algorithm}: steps are fixed here, of BaseStepSize")
         self.tables: dict[str, Any] = {"title": path.stem, "coupling": "jacobi"}
+        if start and exact(start):
+            self.tables["start_time"] = float(exact(start))
         if end:
             self.tables["duration"] = float(exact(end) - exact(start or 0))
         if base:

@@ -91,10 +91,15 @@ def _experiment(
     shortest step size of the FMUs' default experiments. `open_scene` reports those that remain
     missing."""
     experiment = root.find(f"{{{SSD}}}DefaultExperiment")
-    if "duration" not in tables and experiment is not None and experiment.get("stopTime"):
-        if float(experiment.get("startTime", "0")):
-            raise InputFault(f"{path}: starts at {experiment.get('startTime')} s; runs start at 0")
-        tables["duration"] = float(experiment.get("stopTime", ""))
+    if experiment is not None:
+        start, stop = experiment.get("startTime", "0"), experiment.get("stopTime")
+        if float(start):
+            tables["start_time"] = float(start)
+        if "duration" not in tables and stop:
+            try:
+                tables["duration"] = float(exact(stop) - exact(start))
+            except ValueError:  # an infinite one, which a scene refuses
+                tables["duration"] = float(stop) - float(start)
     steps = [_seconds(d.step_size) for d in described if d.step_size]
     if "haptics" not in tables and steps and all(steps):
         tables["haptics"] = {"rate": str(1 / min(steps))}

@@ -105,7 +105,7 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
                 SubElement(line, f"{{{SSC}}}LinearTransformation", linear)
     step_sizes.of_system(top, system)
     _units(root, system)
-    times = {"startTime": "0.0", "stopTime": repr(scene.duration)}
+    times = {"startTime": repr(scene.start_time), "stopTime": repr(scene.stop_time)}
     experiment = SubElement(root, f"{{{SSD}}}DefaultExperiment", times)
     step_sizes.of_experiment(experiment, system)
     annotations = SubElement(root, f"{{{SSD}}}Annotations")

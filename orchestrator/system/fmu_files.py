@@ -79,7 +79,7 @@ def fmu_files(
                 **{name: (step,) for name, step in steps.items()},
                 **starts.get(block.name, {}),
             }
-            experiment = {"stop_time": scene.duration, "step_size": steps[STEP_SIZE]}
+            experiment = {"stop_time": scene.stop_time, "step_size": steps[STEP_SIZE]}
         how: dict[str, Any] = {
             "packaging": packaging,
             "experiment": experiment,

@@ -44,11 +44,13 @@ def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Inpu
         for name, noise in event.noise.items():
             with collect_problem(problems, ("at", i, "noise", name)):
                 taken.append(events.disturb(event, name, noise))
-        problems += ((("at", i, key), why) for key, why in _times(event))
+        problems += ((("at", i, key), why) for key, why in _times(event, scene.start_time))
     return tuple(sorted(taken, key=lambda change: change.begin))
 
 
-def _times(event: TimedEvent) -> Iterator[tuple[str, str]]:
+def _times(event: TimedEvent, begin: float) -> Iterator[tuple[str, str]]:
+    if event.time < begin:
+        yield "time", f"{event.time:g} s is before the run, whose start_time is {begin:g} s"
     if event.until is not None and event.until <= event.time:
         yield "until", f"{event.until:g} s is not after time = {event.time:g} s"
     if not (event.set or event.override or event.freeze or event.noise):
@@ -110,12 +112,11 @@ class _Events:
         if clock not in (c.name for c in timeline.clocks):
             raise ValueError(f"no FMU runs at the rate of {clock}")
         starts = timeline.clock(clock).starts
-        tick = exact(time) / timeline.base
-        k = bisect_left(starts, tick)
-        return timeline.seconds(starts[k]) if k < len(starts) else math.inf
+        k = bisect_left(starts, timeline.ticks_until(exact(time)))
+        return timeline.time(starts[k]) if k < len(starts) else math.inf
 
     def _end(self, event: TimedEvent) -> float:
-        return self._scene.duration + 1.0 if event.until is None else event.until
+        return self._scene.stop_time + 1.0 if event.until is None else event.until
 
     def _require_disturbable(self, name: str, fed: list[Connection]) -> None:
         fmu = name.partition(".")[0]

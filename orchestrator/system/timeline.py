@@ -43,7 +43,7 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
             starts: Sequence[int] = periodic(_period(pace), base, steps * a_tick, pace.first)
         else:
             try:
-                frames = _on_ticks(pace, haptic, steps)
+                frames = _on_ticks(pace, haptic, steps, exact(scene.start_time))
                 if isinstance(frames, Frames):
                     starts = frames.times(a_tick)
                 else:
@@ -53,7 +53,7 @@ def timeline(scene: Scene, planned: Blocks | None = None) -> Timeline:
         if name == "graphics":
             starts = _apply_rate_changes(scene, starts, base, a_tick, steps * a_tick)
         stepped.append(Clock(name, starts, pace.path))
-    return Timeline(base, steps * a_tick, tuple(stepped), given.of)
+    return Timeline(base, steps * a_tick, tuple(stepped), given.of, exact(scene.start_time))
 
 
 SLOWEST = 1e-3
@@ -76,7 +76,8 @@ def _apply_rate_changes(
         except ValueError as error:
             where = scene.place(("at", i, "set", GRAPHICS_RATE), str(error))
             raise SceneFault(scene.title, [where]) from error
-        before = starts[: bisect_left(starts, exact(event.time) / base) + 1]
+        after = exact(event.time) - exact(scene.start_time)
+        before = starts[: bisect_left(starts, after / base) + 1]
         begin = before[-1]
         count = max(math.ceil((end - begin) / period), 0) + 3
         later = (math.ceil((begin + k * period) / a_tick) * a_tick for k in range(1, count))
@@ -101,13 +102,15 @@ def _period(pace: ClockRate) -> Fraction:
     return 1 / pace.rate
 
 
-def _on_ticks(pace: ClockRate, haptic: Fraction, steps: int) -> Sequence[int]:
-    """Starts of steps that are aligned to haptic ticks, counted in haptic ticks."""
+def _on_ticks(pace: ClockRate, haptic: Fraction, steps: int, begin: Fraction) -> Sequence[int]:
+    """Starts of steps that are aligned to haptic ticks, counted in haptic ticks from `begin` (s)
+    on; of times at which steps end, those before that are left out."""
     if isinstance(pace.rate, VariableRate):
         low, high, seed = exact(pace.rate.min), exact(pace.rate.max), pace.rate.seed
         return variable(low, high, seed, haptic, steps)
     if isinstance(pace.rate, tuple):
-        starts = round_up_to_ticks([exact(time) for time in pace.rate], haptic)
+        times = (exact(time) - begin for time in pace.rate)
+        starts = round_up_to_ticks([time for time in times if time >= 0], haptic)
         # One more step, so that a last time at the end of the run has a communication point.
         return (*starts, 2 * starts[-1] - starts[-2])
     return align_to_ticks(_period(pace), haptic, steps, pace.first)

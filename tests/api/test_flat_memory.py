@@ -55,7 +55,7 @@ def test_states_that_are_saved_over_are_freed(tmp_path: Path) -> None:
     description = describe_once(build(gain("gain", 2.0, 0.0), tmp_path))
 
     with InProcess("gain", description, np.zeros(2)) as instance:
-        instance.enter_initialization(1.0)
+        instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
         instance.save()
         tracemalloc.start()

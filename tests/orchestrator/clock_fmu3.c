@@ -42,6 +42,9 @@ int fmi3Terminate(Model *m) { return m->state >= STEP ? 0 : 3; }
 int fmi3EnterInitializationMode(Model *m, bool given, double tolerance, double start, bool stops,
                                 double stop) {
     m->state = INITIALIZATION;
+    m->time = start;
+    for (int k = 0; k < CLOCKS; k++) /* the first instant of a clock is told from the start on */
+        if (k != GO) m->next[k] += start;
     return 0;
 }
 int fmi3ExitInitializationMode(Model *m) {

@@ -32,12 +32,12 @@ def outputs(path: Path, experiment: Experiment, step: int) -> Outputs:
         chosen = [v for v in variables if v.causality == "output"]
         local = [v for v in variables if v.causality == "local"]
         slave = opened.instance()
-        initialize(slave)
+        initialize(slave, timeline.time(0))
         references = [v.valueReference for v in chosen]
         ticks, values = [0], [slave.getReal(references)]
         while ticks[-1] + step <= timeline.end:
             try:
-                slave.doStep(timeline.seconds(ticks[-1]), timeline.seconds(step))
+                slave.doStep(timeline.time(ticks[-1]), timeline.seconds(step))
             except FMICallException:
                 assert experiment.outcome.reason == "stop_when", opened.messages
                 break
@@ -45,7 +45,7 @@ def outputs(path: Path, experiment: Experiment, step: int) -> Outputs:
             values.append(slave.getReal(references))
         measured = {v.name: slave.getReal([v.valueReference])[0] for v in local}
         if experiment.outcome.reason == "duration":  # what the last event adds to the energies
-            end = timeline.seconds(ticks[-1])
+            end = timeline.time(ticks[-1])
             slave.doStep(end, timeline.seconds(1))
         energies = [v for v in local if v.name.startswith("energy.")]
         measured |= {v.name: slave.getReal([v.valueReference])[0] for v in energies}
@@ -62,9 +62,10 @@ def differing(found: Outputs, experiment: Experiment, skipped: str = "-") -> Ite
     newest row at or before it; of a sampled block, which its event may evaluate, the newest before
     it, or at it with a scheme that gets all outputs first.
     """
-    base = float(experiment.system.timeline.base)
+    timeline = experiment.system.timeline
+    base, begin = float(timeline.base), float(timeline.begin)
     for table in experiment.results.tables.values():
-        stamps = np.rint(table["time"] / base).astype(int)
+        stamps = np.rint((table["time"] - begin) / base).astype(int)
         for column in (c for c in table.columns[1:] if not c.startswith(skipped)):
             values = found.values[:, found.names.index(column)]
             late = (0, 1) if column in found.discrete else (0,)

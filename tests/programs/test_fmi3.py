@@ -94,9 +94,9 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
         assert fails(slave.doStep, 0.0, 0.1).startswith(
             "fmi3DoStep may not be called: the FMU is i"
         )
-        slave.setupExperiment(1.0)
+        slave.setupExperiment(-1.0)
         message = fails(slave.enterInitializationMode)
-        assert message == "a scene starts at 0 s, not at 1 s"
+        assert message == "a scene starts at 0 s or later, not at -1 s"
         initialize(slave)
         message = fails(slave.enterInitializationMode)
         assert message == "fmi3EnterInitializationMode may not be called: the FMU is initialised"

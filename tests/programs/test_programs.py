@@ -213,7 +213,7 @@ def test_wrong_calls_are_errors_that_name_block_and_signal() -> None:
             return opened.messages[-1]
 
         assert "is instantiated" in fails(slave.doStep, 0.0, 0.1)
-        assert "starts at 0 s" in fails(slave.setupExperiment, None, 1.0)
+        assert "starts at 0 s or later" in fails(slave.setupExperiment, None, -1.0)
         initialize(slave)
         assert "is initialised" in fails(slave.enterInitializationMode)
         assert "unknown value reference 99999" in fails(slave.getReal, [99999])
@@ -357,3 +357,16 @@ def test_programs_of_tests_are_left_to_pytest(tmp_path_factory) -> None:
     """Which removes folders of former sessions; those of processes that were killed, too."""
     made = program("pendulum", (HALF,))
     assert made.is_relative_to(tmp_path_factory.getbasetemp().parent)
+
+
+def test_it_begins_at_the_start_time_that_it_is_told(tmp_path: Path) -> None:
+    """As a run with that `start_time`, of which the sine of the hand is another than from 0 on."""
+    sine = "{amplitude=[0.3,0.1,0.0],frequency=[1.1,0.7,0.5]}"
+    options = ("duration=0.1", f'hand={{type="profile",table={sine}}}')
+    experiment = run("closed-loop-ideal", (*options, "start_time=2.0"), tmp_path / "later")
+    path = program("closed-loop-ideal", options)
+    step = experiment.system.timeline.clocks[0].longest
+    found = outputs(path, experiment, step)
+    assert [*differing(found, experiment)] == []
+    first = run("closed-loop-ideal", options, tmp_path / "first")
+    assert [*differing(found, first)] != []

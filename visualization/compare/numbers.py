@@ -136,7 +136,7 @@ def _timing(run: Results) -> Numbers:
     record = run.record
     if wall_time := record.timings.run:
         yield "run time (s)", short(wall_time)
-        yield "times real time", short(run.last_time / wall_time)
+        yield "times real time", short((run.last_time - record.begun) / wall_time)
     for name, age in record.delays.items():
         if age.max > 0:
             ages = f"{short(1e3 * age.min)} to {short(1e3 * age.max)}"

@@ -49,11 +49,13 @@ Array = NDArray[np.float64]
 def write_animation(runs: Sequence[Recorded], names: Sequence[str], path: Path) -> None:
     """Writes a GIF, WebP or animated PNG, by the ending of the path's name, which begins anew after
     its end. The same runs give the same bytes."""
+    begin = min(float(run.times[0]) for run in runs)
     end = max(float(run.times[-1]) for run in runs)
-    times = np.linspace(0.0, end, int(np.clip(np.ceil(end / MIN_PERIOD) + 1, 2, MAX_FRAMES)))
+    frames = int(np.clip(np.ceil((end - begin) / MIN_PERIOD) + 1, 2, MAX_FRAMES))
+    times = np.linspace(begin, end, frames)
     panels = [_Panel(run, name, times) for run, name in zip(runs, names, strict=True)]
     first, *others = _with_palette(list(_pictures(panels, times)))
-    milliseconds = round(1e3 * max(end, MIN_DURATION) / len(times))
+    milliseconds = round(1e3 * max(end - begin, MIN_DURATION) / len(times))
     first.save(
         path, save_all=True, append_images=others, loop=0, optimize=True, lossless=True,
         duration=[milliseconds] * (len(times) - 1) + [round(1e3 * LAST_FRAME)],

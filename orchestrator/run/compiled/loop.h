@@ -320,7 +320,7 @@ typedef struct {
     Hold **holds /* [n_holds] */;
     Meter **meters /* [n_meters] */;
     Table *tables /* [n_tables] */;
-    double numerator, denominator;        /* of a tick (s) */
+    double numerator, denominator, begin; /* (numerator tick + begin)/denominator: the time (s) of a tick */
     int64_t late;                         /* ticks by which the event comes after its own */
 } Loop;
 
@@ -380,7 +380,7 @@ enum {
 };
 
 static inline double tick_time(const Loop *l, int64_t tick) { /* s */
-    return (double)tick * l->numerator / l->denominator;
+    return ((double)tick * l->numerator + l->begin) / l->denominator;
 }
 
 /* When a step begins and ends (s): from part `first` to part `last` of `parts` of a tick each, from 0 on. */
@@ -393,9 +393,9 @@ typedef struct {
 static inline void locate_step(const Loop *l, const Op *op, int64_t tick, StepTimes *s) {
     const int64_t first = tick * op->c + op->b, last = first + op->d;
     if (first == s->first && last == s->last && op->c == s->parts) return;
-    const double whole = l->denominator * (double)op->c;
-    *s = (StepTimes){first, last, op->c, (double)first * l->numerator / whole,
-                     (double)last * l->numerator / whole};
+    const double whole = l->denominator * (double)op->c, begin = l->begin * (double)op->c;
+    *s = (StepTimes){first, last, op->c, ((double)first * l->numerator + begin) / whole,
+                     ((double)last * l->numerator + begin) / whole};
 }
 
 #ifndef EXPORT

@@ -268,7 +268,7 @@ class Machine:
             return
         elif code == structures.SETTLE:
             assert isinstance(instruction, Step)
-            instance, now = simulation.instances[instruction.fmu], simulation.seconds(tick)
+            instance, now = simulation.instances[instruction.fmu], simulation.time(tick)
             if instance.place.waiting <= now:
                 instance.settle(now)
                 return

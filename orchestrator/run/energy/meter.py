@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.results.run_record import Energy
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import fill_reader
@@ -93,12 +94,13 @@ class Meter:
         self.take_rows()
         self.c.fill(full=saved["full"], least=saved["least"])
 
-    def energy(self, seconds: float) -> Energy:
-        """The energies until now; `seconds` is the length of a tick (s)."""
+    def energy(self, seconds: float, begin: float = 0.0) -> Energy:
+        """The energies until now; `seconds` is the length of a tick, `begin` the time of the first
+        (s)."""
         found = np.zeros(5)
         self._library.energy(ctypes.addressof(self.c), found.ctypes.data)
         generated, held, ideal, peak, stamp = found.tolist()
-        return Energy(generated, held, ideal, int(stamp) * seconds, peak)
+        return Energy(generated, held, ideal, begin + int(stamp) * seconds, peak)
 
 
 def _grown(array: Rows, rows: int) -> Rows:
@@ -110,18 +112,23 @@ def _grown(array: Rows, rows: int) -> Rows:
 
 class Meters:
     """One meter for each connection that carries power, of the efforts that its target gets: `of`
-    by its name, of_source and of_target the names by FMU; tick_s: a tick (s). The gets and sets of
+    by its name, of_source and of_target the names by FMU; tick_s, begin: the length of a
+    tick, and the time of the first (s). The gets and sets of
     a run update them (`instructions`)."""
 
     def __init__(self, library: ctypes.CDLL, signals: SignalVector) -> None:
         self.of: dict[str, Meter] = {}
         self.of_source: dict[str, list[str]] = {}
         self.of_target: dict[str, list[str]] = {}
-        self.tick_s, self._values = float(signals.system.timeline.base), signals.values
+        self.take_time(signals.system.timeline)
+        self._values = signals.values
         for c, readers in metered(signals):
             self.of[c.name] = Meter(library, *readers)
             self.of_source.setdefault(c.source, []).append(c.name)
             self.of_target.setdefault(c.target, []).append(c.name)
+
+    def take_time(self, timeline: Timeline) -> None:
+        self.tick_s, self.begin = float(timeline.base), float(timeline.begin)
 
     def start(self) -> None:
         for meter in self.of.values():
@@ -138,7 +145,7 @@ class Meters:
 
     def energies(self) -> dict[str, Energy]:
         """The energies (J) of each connection that carries power, by its name."""
-        return {name: meter.energy(self.tick_s) for name, meter in self.of.items()}
+        return {name: meter.energy(self.tick_s, self.begin) for name, meter in self.of.items()}
 
 
 def metered(signals: SignalVector) -> Iterator[tuple[Connection, tuple[Reader, Reader, Reader]]]:

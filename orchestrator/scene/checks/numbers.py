@@ -42,8 +42,9 @@ def _rate(path: Path, rate: AnyRate, scene: Scene) -> Iterator[Problem]:
         if exact(rate.min) > exact(rate.max):
             yield (*path, "min"), f"{rate.min} Hz is above max = {rate.max} Hz: swap them"
     elif isinstance(rate, tuple):
-        if not rate or rate[-1] < scene.duration:
-            yield path, f"the times end before duration = {scene.duration} s: add more"
+        if not rate or rate[-1] < scene.stop_time:
+            after = f"start_time = {scene.start_time} s and " if scene.start_time else ""
+            yield path, f"the times end before {after}duration = {scene.duration} s: add more"
         if any(b <= a for a, b in zip((0.0, *rate), rate, strict=False) if b != 0.0):
             yield path, "times must rise: sort them and drop repeated ones"
 

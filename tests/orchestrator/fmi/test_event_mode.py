@@ -86,7 +86,7 @@ def test_a_restored_state_has_the_time_events_that_it_had(tmp_path):
     description = describe(event_fmu3(tmp_path))
     outputs = np.zeros(len(description.outputs))
     with in_process(description)("one", description, outputs) as instance:
-        instance.enter_initialization(1.0)
+        instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
         instance.save()
         reached = []

@@ -55,7 +55,7 @@ def test_a_state_that_is_saved_or_restored_in_part_is_none(tmp_path, place):
     description = describe(hostile_fmu(tmp_path))
     outputs = np.zeros(len(description.outputs))
     with in_process(description)(f"{place}_minus_0", description, outputs) as instance:
-        instance.enter_initialization(1.0)
+        instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
         if place == "restore":
             instance.save()

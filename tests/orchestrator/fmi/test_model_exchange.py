@@ -145,7 +145,7 @@ def test_a_restored_state_goes_on_as_before(tmp_path):
     description = describe(equations_fmu(tmp_path))
     outputs = np.zeros(len(description.outputs))
     with in_process(description)("one", description, outputs) as instance:
-        instance.enter_initialization(1.0)
+        instance.enter_initialization(0.0, 1.0)
         instance.exit_initialization()
         instance.step(0.0, 0.25, 0.25)
         instance.save()

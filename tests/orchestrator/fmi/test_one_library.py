@@ -31,7 +31,7 @@ def test_instances_of_our_file_share_a_folder_until_the_last_is_closed(
             stack.enter_context(instance)
         assert len([*own_temporary_folder.iterdir()]) == 1
         for i, instance in enumerate(instances):
-            instance.enter_initialization(1.0)
+            instance.enter_initialization(0.0, 1.0)
             instance.exit_initialization()
             scalars = [*description.port("u", "input"), *description.port("w", "input")]
             instance.connect(scalars, range(len(scalars)))(np.array([0.0, float(i)]))

@@ -48,7 +48,7 @@ class Run:
     def started(self) -> Run:
         for call in ("hello", "connect", "enter_initialization", "exit_initialization"):
             of = {"hello": ("slow", OUTPUTS, self.identity), "connect": (["u"],)}
-            ends = {"enter_initialization": (1.0,)}
+            ends = {"enter_initialization": (0.0, 1.0)}
             assert self.call(call, *(of | ends).get(call, ())).kind == "answer"
         return self
 
@@ -102,7 +102,7 @@ def test_calls_out_of_order_are_refused(run: Run) -> None:
     for call, arguments in (
         ("step", (0.25, 0.5, 0.25)),  # a replayed stamp
         ("step", (0.5, 0.5, 0.0)),
-        ("enter_initialization", (1.0,)),
+        ("enter_initialization", (0.0, 1.0)),
         ("connect", (["y"],)),
         ("connect", ([5],)),
     ):

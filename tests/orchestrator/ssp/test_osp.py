@@ -71,12 +71,13 @@ def test_it_runs_as_its_master_steps_it(structure):
 
 
 def test_what_is_read_otherwise_is_told(structure, caplog):
-    path = structure(
-        a=("<EndTime>", "<StartTime>0.1</StartTime><EndTime>"), b=("fixedStep", "ecco")
-    )
-    assert hl.run(path).run["end"]["time"] == pytest.approx(0.4)
-    assert "StartTime = 0.1: a run begins at 0 s" in caplog.text
+    assert hl.run(structure(change=("fixedStep", "ecco"))).fault is None
     assert "Algorithm = ecco: steps are fixed here, of BaseStepSize" in caplog.text
+
+
+def test_it_begins_at_its_start_time(structure):
+    found = hl.run(structure(change=("<EndTime>", "<StartTime>0.1</StartTime><EndTime>")))
+    np.testing.assert_array_equal(found.haptics["time"], np.arange(10, 51) / 100)
 
 
 @pytest.mark.parametrize(

@@ -250,7 +250,6 @@ CIRCLE = system(
          r"it is for co-simulation only, not for model-exchange"),
         ('source="resources/Plain', 'implementation="ScheduledExecution" source="resources/Plain',
          r"right\.p is a Component for ScheduledExecution"),
-        ('startTime="0.0"', 'startTime="1.0"', "starts at 1.0 s; runs start at 0"),
         ('kind="input"', 'kind="inout"', r"right\.u is inout"),
         (connectors(u="input"), connectors(u="input N"),
          r"units of left\.out and right\.u do not fit: m is not"),
