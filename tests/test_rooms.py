@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16351,
     "programs": 1025,
     "analysis": 8890,
-    "visualization": 3676,
+    "visualization": 3678,
     "api": 635,
     "commands": 1606,
 }
