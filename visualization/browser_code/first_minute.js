@@ -31,8 +31,8 @@ export function felt(vibration, force, watched, ended) {
 }
 
 // Why, of the control of the rate, and whether the linkage's steps are taken when they begin.
-export const why = ({ value, max }, early) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
-the force on the hand ${Math.round(max)} times a second. In between, that force uses ${early ? "where the linkage goes: its step is computed when it begins."
+export const why = ({ value, haptics }, early) => `The linkage is computed ${value ? `${+value.toPrecision(3)} times a second` : "at a rate that varies"}, \
+the force on the hand ${Math.round(haptics)} times a second. In between, that force uses ${early ? "where the linkage goes: its step is computed when it begins."
   : "where the linkage was. A late force can feed a swing that it should damp."}`;
 
 export class FirstMinute {

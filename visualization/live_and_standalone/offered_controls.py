@@ -70,6 +70,7 @@ class Offered:
         self._of = " and ".join(of)
         self.rate = scene.graphics.rate if scene.graphics and fmus else None
         most = float(1 / (system.timeline.clocks[0].longest * system.timeline.base))
+        self._haptics = most
         if late := result_after(system, CLOCK):
             most = min(most, 1 / late)
         self._ranges = {**ranges, "graphics": (ranges["graphics"][0], most)}
@@ -83,7 +84,8 @@ class Offered:
         """The controls by `key`, each with its value and what bounds it, as JSON has it."""
         controls: list[dict[str, Any]] = []
         if self.rate is not None:
-            rate = {"key": RATE, "value": self.own_rate, "words": _title(self._of)}
+            rate: dict[str, Any] = {"key": RATE, "value": self.own_rate, "words": _title(self._of)}
+            rate["haptics"] = self._haptics
             controls += [rate, {"key": JITTER, "value": 0.0}]
         if self.topology:
             controls.append({"key": RENDERED, "value": True})

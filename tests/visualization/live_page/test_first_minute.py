@@ -249,3 +249,10 @@ def test_the_hold_model_begins_anew_and_ends_the_vibration_at_a_slow_rate(
     page.until("location.hash === ''")
     assert page.get(held) == "zoh"
     assert page.page.is_visible("#remedy")
+
+
+def test_why_has_the_rate_of_the_force_not_the_highest_of_the_linkage() -> None:
+    """Which a computing_time makes lower."""
+    rate = {"value": 40, "max": 50, "haptics": 512}
+    said = javascript("first_minute.js", "answer = why(given, true);", rate)
+    assert "computed 40 times a second, the force on the hand 512 times" in said
