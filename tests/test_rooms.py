@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16398,
     "programs": 1027,
     "analysis": 8890,
-    "visualization": 3678,
+    "visualization": 3680,
     "api": 635,
     "commands": 1612,
 }
