@@ -116,7 +116,7 @@ def run(
         hapticlink run closed-loop --format pdf,svg
         hapticlink run my-scene.toml --no-figures --json > result.json
         hapticlink run closed-loop --save 1 --save end
-        hapticlink run --from runs/closed-loop/at-1.state --set controller.K_pc=[20,20,0.2]
+        hapticlink run --from runs/closed-loop/at-1.state --set hold=foh
         hapticlink run closed-loop --real-time --device simulated-board
     """
     import hapticlink as hl

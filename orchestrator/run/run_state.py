@@ -357,7 +357,7 @@ def new_starts(state: RunState, system: System) -> Iterator[InputChange]:
     for u in system.fmus:
         before, now = state.content["fmus"][u.name]["starts"], starts_by_name(u)
         by_name = {s.name: s for s in (*u.description.scalars, *(s for s, _ in u.starts))}
-        for name in sorted({*before, *now}):
+        for name in sorted({*before, *now} & by_name.keys()):  # of one FMU: all of them
             value = now.get(name, by_name[name].start)
             if value != before.get(name, by_name[name].start):
                 text = f"{u.name}.{name}"

@@ -198,6 +198,12 @@ def test_a_time_at_which_nothing_can_be_saved(tmp_path, save, why):
         hl.run("single-body", SMALL, out=tmp_path, save=save)
 
 
+def test_a_state_of_another_scene_is_refused_with_what_differs(small):
+    """Its FMUs lack some parameters of those of the same names."""
+    with pytest.raises(InputFault, match=r"cannot go on from this state(.|\n)*is another FMU"):
+        hl.run("serial", {"resume": str(small), "duration": 0.5})
+
+
 def test_a_run_does_not_replace_what_it_goes_on_from(small):
     with pytest.raises(InputFault, match="has the state and the results before it"):
         hl.run(small, out=small.parent)
