@@ -15,6 +15,7 @@ from hapticlink.orchestrator.results.state_file import SUFFIX, read_state
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find_scene import find_scene
+from hapticlink.orchestrator.scene.hold_tables import write_hold_tables
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.read_and_check import from_source
 from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
@@ -101,6 +102,7 @@ def write_tables(scene: Scene) -> dict[str, Any]:
     tables: dict[str, Any] = adapter().dump_python(
         scene.plain(), mode="json", by_alias=True, exclude_none=True
     )
+    write_hold_tables(tables)
     return tables
 
 

@@ -84,6 +84,13 @@ def read_hold_tables(data: Any) -> tuple[list[Any], list[Problem]]:
     return errors, wrong
 
 
+def write_hold_tables(data: Any) -> None:
+    """Puts tables in the place of the names of holds with parameters, so that these are keys."""
+    for path, found in [*find_hold_tables(data)]:
+        if isinstance(found, str) and parameters_in(found):
+            value(data, path[:-1])[path[-1]] = _table(found)
+
+
 def read_hold(name: str) -> str:
     """The name of a hold with parameters, checked. Raises InputFault."""
     data = {"hold": name}

@@ -161,3 +161,11 @@ def test_an_ssp_keeps_them(tmp_path):
     hold = {"holds": {SIGNAL: {"type": "weighted", "weight": 0.5}}}
     hl.export("single-body", SHORT | hold, out=tmp_path / "body.ssp")
     assert hl.run(tmp_path / "body.ssp").run["holds"][SIGNAL] == "weighted(weight=0.5)"
+
+
+def test_a_state_goes_on_with_another_parameter(tmp_path):
+    first = SHORT | {"hold": {"type": "weighted", "weight": 0.5}}
+    hl.run("single-body", first, out=tmp_path / "a", save=[0.125], figures=False)
+    state = tmp_path / "a" / "at-0.125.state"
+    names = [hl.run(state, {"hold.weight": w}, figures=False).run["holds"] for w in (0.5, 0.25)]
+    assert [name[SIGNAL] for name in names] == ["weighted(weight=0.5)", "weighted(weight=0.25)"]
