@@ -55,10 +55,12 @@ def test_hold(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert hold.value(7) == 1.0
     hold.push(15, np.array([4.0]), 15)
     assert hold.value(20) == hold.value(15, ahead=5) == pytest.approx(4.5)
-    found = run("closed-loop-ideal")
     name = "virtual_environment.Lambda_inv -> controller.Lambda_inv"
-    assert found.run["holds"][name] == "fractional-order"
-    assert [*found.run["plugins"]] == ["fractional_order"]
+    given = {"hold=fractional": "fractional-order", "hold=_type": "fractional-order(beta=0.3)"}
+    for option, told in given.items():
+        found = run(f"closed-loop-ideal*{option}")
+        assert found.run["holds"][name] == told
+        assert [*found.run["plugins"]] == ["fractional_order"]
 
 
 def test_integrator(run: Run) -> None:
