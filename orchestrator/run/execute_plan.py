@@ -28,7 +28,7 @@ from hapticlink.orchestrator.results.run_record import End, RecordedFault, RunEn
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run import kept_runs, run_state
 from hapticlink.orchestrator.run.compiled import lanes
-from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop, Halt
+from hapticlink.orchestrator.run.compiled.loop import NO_HALTS, CompiledLoop
 from hapticlink.orchestrator.run.compiled.operation_records import Stop
 from hapticlink.orchestrator.run.initialize import start_outside
 from hapticlink.orchestrator.run.kept_runs import KeptRun, StartMemory
@@ -171,21 +171,34 @@ class _Run:
         return loop
 
     def run_events(self, progress: Progress | None) -> None:
-        """Run all events."""
-        loop = self.loop
+        """Run all events, write the tables, however the events end, and measure the time of
+        both."""
+        loop, simulation, outcome = self.loop, self._simulation, self.outcome
         assert loop
-        assert self._simulation
-        halts = self._saving.halts(self._simulation, loop) if self._saving else NO_HALTS
-        _run_events(
-            self._plan,
-            self._simulation,
-            loop,
-            self._results,
-            self.outcome,
-            progress,
-            self._real_time,
-            halts,
-        )
+        assert simulation
+        halts = self._saving.halts(simulation, loop) if self._saving else NO_HALTS
+        begin = shown = perf_counter()
+
+        def turn(tick: int) -> None:
+            nonlocal shown
+            time = self._plan.system.timeline.time(tick)
+            interrupt.raise_if_interrupted(time)
+            if self._real_time:
+                self._real_time.turn(loop)
+            if progress and perf_counter() - shown > PAUSE:
+                shown = perf_counter()
+                progress(time)
+
+        try:
+            # Tables are written with all the depth that there is.
+            with host_state.restore_interpreter():
+                loop.run(turn, halts)
+        finally:
+            for instance in simulation.instances.values():
+                instance.rest()
+            outcome.wall_time = perf_counter() - begin
+            self._results.finish()
+            outcome.table_time = perf_counter() - begin - outcome.wall_time
 
     def take_time(self, wall_time: float) -> None:
         """Note the time (s) of the loop where others ran beside it, and end the tables."""
@@ -277,42 +290,6 @@ def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> l
             one.take_time(share)
             one.end()
     return [one.conclude() if one in lasted else None for one in runs]
-
-
-def _run_events(
-    plan: Plan,
-    simulation: Simulation,
-    loop: CompiledLoop,
-    results: RunResults,
-    outcome: Outcome,
-    progress: Progress | None,
-    real_time: RealTimeRun | None,
-    halts: Iterator[Halt],
-) -> None:
-    """Run all events, write the tables, however the events end, and measure the time of both."""
-    begin = shown = perf_counter()
-
-    def turn(tick: int) -> None:
-        nonlocal shown
-        time = plan.system.timeline.time(tick)
-        interrupt.raise_if_interrupted(time)
-        if real_time:
-            real_time.turn(loop)
-        if progress and perf_counter() - shown > PAUSE:
-            shown = perf_counter()
-            progress(time)
-
-    try:
-        with (
-            host_state.restore_interpreter()
-        ):  # tables are written with all the depth that there is
-            loop.run(turn, halts)
-    finally:
-        for instance in simulation.instances.values():
-            instance.rest()
-        outcome.wall_time = perf_counter() - begin
-        results.finish()
-        outcome.table_time = perf_counter() - begin - outcome.wall_time
 
 
 def _details(

@@ -233,4 +233,5 @@ NOW = {
 def find_old_keys(data: Mapping[str, Any]) -> Iterator[Problem]:
     for path, table in device_tables(data):
         for key in (key for key in table if key in NOW):
-            yield (*path, key), f"a device is a linkage now: {NOW[key]}"
+            remedy = NOW[key].replace("write ", f"write {'.'.join(map(str, path))}.")
+            yield (*path, key), f"a device is a linkage now: {remedy}"

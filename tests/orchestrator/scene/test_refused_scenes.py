@@ -32,7 +32,7 @@ REFUSED = {
         ('power=[{effort="a.F", displacement="a.x", sign=0.5}]', "0.5 is no sign: write 1 or -1"),
         ("directions.hysteresis=10", "10.0 times rank_tolerance = 0.1 is 1"),
         ("device.base_y_a=0.3", "a device is a linkage now: base joints are at `at_parent`"),
-        ("device.torque_limit=0.1", "a device is a linkage now: write motor.torque_limit"),
+        ("device.torque_limit=0.1", "a device is a linkage now: write device.motor.torque_limit"),
         ("device.extends=twinn", "neither a file nor a shipped device; did you mean 'twin'?"),
         ("device.body.crankk.mass=1.0", "no entry 'crankk'; did you mean 'crank'?"),
         ("device.body.a_right_distal.like=distal", "'distal' is no body that says its own"),
