@@ -78,7 +78,7 @@ def _ended(at: float) -> float:
 
 ALONE = """
 from hapticlink.orchestrator.boards.open_kit import OpenKit
-OpenKit.last_words = lambda self: None
+OpenKit.zero_torque_when_killed = lambda self: None
 """
 """Leaves out the process that stands by."""
 RUN = """

@@ -26,8 +26,8 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.boards.driver import DRIVERS, DeviceDriver, Silent, Wiring
-from hapticlink.orchestrator.boards.last_words import write_if_killed
 from hapticlink.orchestrator.boards.safe_torques import SafeTorques
+from hapticlink.orchestrator.boards.zero_torque_when_killed import write_if_killed
 from hapticlink.orchestrator.fmi.description import VARIABLE_STEP, Description
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -173,7 +173,7 @@ class Board(Instance):
         self._stack.callback(driver.close)
         try:
             driver.open()
-            if words := driver.last_words():
+            if words := driver.zero_torque_when_killed():
                 self._stack.enter_context(write_if_killed(*words))
         except (Silent, OSError) as error:
             raise self._fault(f"the board at {self._table.port} {_told(error)}", 0.0) from None

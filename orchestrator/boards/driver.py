@@ -101,7 +101,7 @@ class DeviceDriver(ABC):
         seconds; of an encoder at its `home` angle they are that angle's. Raises Silent where none
         comes, or one that is not as the protocol says, and OSError."""
 
-    def last_words(self) -> tuple[int, bytes] | None:
+    def zero_torque_when_killed(self) -> tuple[int, bytes] | None:
         """The file descriptor of the open port and the message of zero torque, which another
         process writes there if this one is killed; None where that cannot be done."""
         return None

@@ -127,7 +127,7 @@ class OpenKit(DeviceDriver):
             found[i] = float(round(count))
         return found
 
-    def last_words(self) -> tuple[int, bytes] | None:
+    def zero_torque_when_killed(self) -> tuple[int, bytes] | None:
         if os.name != "posix" or not self._serial:
             return None
         return self._serial.fileno(), self.message([0.0] * len(self._motors))

@@ -77,7 +77,7 @@ def kit(port: Port) -> type[OpenKit]:
             self._write(bytes([0, 5]))
             self._write(self.set_up())
 
-        def last_words(self) -> None:
+        def zero_torque_when_killed(self) -> None:
             return None
 
     return AtPort

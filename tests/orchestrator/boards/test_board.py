@@ -239,7 +239,7 @@ def test_a_killed_process_leaves_a_message(killed: bool) -> None:
     reading, writing = os.pipe()
     program = (
         "import os, sys\n"
-        "from hapticlink.orchestrator.boards.last_words import write_if_killed\n"
+        "from hapticlink.orchestrator.boards.zero_torque_when_killed import write_if_killed\n"
         "with write_if_killed(int(sys.argv[1]), b'zero'):\n"
         "    os.write(1, b'ready')\n" + ("    os.kill(os.getpid(), 9)\n" if killed else "")
     )
