@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7456,
     "fmus": 2992,
-    "orchestrator": 16382,
+    "orchestrator": 16388,
     "programs": 1027,
     "analysis": 8890,
-    "visualization": 3680,
+    "visualization": 3688,
     "api": 635,
-    "commands": 1612,
+    "commands": 1619,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -274,6 +274,8 @@ def test_signs_and_factors_of_a_map_make_it_the_same_law(tmp_path, packaging):
     [
         ("F=0*force0,force1,force2", "0*force0: a factor is a finite number other than 0"),
         ("F=1e999*force0,force1,force2", "a factor is a finite number other than 0"),
+        ("F=-force{0,1,2", "-force{0: a brace without its other, or an empty entry: write a list"),
+        ("F=force{0,,2}", "force{0,,2}: a brace without its other, or an empty entry"),
         ("F=force{0,1}", "2 variables for the 3 entries of F"),
         ("F=force0+1,force1,force2", "no variable of the FMU 'force0+1'"),
         (
