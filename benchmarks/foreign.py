@@ -28,7 +28,7 @@ from benchmarks.foreign_runs import (
     Comparison,
     choose_experiment,
     compare,
-    takes_each_step,
+    has_states,
 )
 from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
@@ -47,7 +47,9 @@ FAST: dict[str, dict[str, Any]] = {
 """Parameters that give an FMU for model exchange of that name a short time constant, with which it
 is run, too."""
 TOLERANCES = (1e-7, 1e-9)
-"""With which FMUs are run that are told of each step of the solver, besides their own."""
+"""With which FMUs for model exchange are run besides their own."""
+EQUAL = 1e-9
+"""Differences relative to an output's largest value that no tolerance explains: rounding."""
 EXPLICIT = 3.31
 """The explicit method of Dormand and Prince is stable for steps up to this many times a time
 constant (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.2)."""
@@ -97,7 +99,7 @@ def _cases(fmu: ForeignFmu) -> Iterator[Case]:
     if "model-exchange" in fmu.interfaces:
         if fmu.path.stem in FAST:
             yield Case("model-exchange", FAST[fmu.path.stem])
-        if takes_each_step(fmu.path):
+        if has_states(fmu.path):
             yield from (Case("model-exchange", tolerance=each) for each in TOLERANCES)
 
 
@@ -173,8 +175,8 @@ def _equal(rows: Iterable[Row]) -> str:
     """How many runs are equal, and the largest difference of others relative to the output's
     largest value."""
     found = [(row, _comparison(row)) for row in rows]
-    relative = [c.difference / c.scale for row, c in found if not (c.equal or _ends_by_event(row))]
-    others = f", others are within {max(relative):.1g} of its largest" if relative else ""
+    relative = [_relative_difference(row) for row, c in found if not c.equal]
+    others = f", others are within {max(relative):.1g} of its largest" if any(relative) else ""
     equal = sum(c.equal for _, c in found)
     return (
         f"{equal} of {len(found)} runs have every number of an output equal to the last bit{others}"
@@ -218,35 +220,39 @@ def _stiff_table(exchange: list[Row]) -> Iterator[str]:
 
 
 def _tolerance_table(rows: list[Row]) -> Iterator[str]:
-    """The differences of FMUs that are told of each step, by tolerance, at the same rate."""
+    """The differences of FMUs that differ by more than rounding, by tolerance, at one rate."""
     found: dict[tuple[str, ...], dict[str, Row]] = defaultdict(dict)
     for row in rows:
         if row["interface"] == "model-exchange":
             of = tuple(row[key] for key in ("package", "file", "rate_hz"))
             found[of][row["settings"]] = row
     names = ["", *(Case(tolerance=each).settings for each in TOLERANCES)]
-    whole = [by for by in found.values() if all(name in by for name in names)]
+    whole = [
+        by
+        for by in found.values()
+        if all(name in by for name in names) and _relative_difference(by[""]) > EQUAL
+    ]
     yield from (
         "## By tolerance",
         "",
-        "FMUs that are told of each step of the solver, with tighter tolerances in both tools: the "
-        "difference of the output that differs most, relative to its largest value.",
+        f"FMUs for model exchange that differ by more than {EQUAL:g}, with tighter tolerances in "
+        "both tools: the difference of the output that differs most, relative to its largest "
+        "value.",
         "",
     )
     cells = (
         (*_about(by[""])[:2], by[""]["fmi"], f"{by['']['rate_hz']} Hz",
-         *(_relative(by[name]) for name in names))
+         *(f"{_relative_difference(by[name]):.1e}" for name in names))
         for by in whole
     )  # fmt: skip
     heads = " | ".join(f"{each:g}" for each in TOLERANCES)
     yield from (*table(f"FMU | from | FMI | rate | its own | {heads}", "llrrrrr", cells), "")
 
 
-def _relative(row: Row) -> str:
+def _relative_difference(row: Row) -> float:
     found = _comparison(row)
-    if _ends_by_event(row):
-        return "last row"
-    return "0" if found.equal else f"{found.difference / found.scale:.1e}"
+    same = found.equal or not found.outputs or _ends_by_event(row)
+    return 0.0 if same else found.difference / found.scale
 
 
 def _listed(names: list[str]) -> str:

@@ -30,6 +30,8 @@ ROOT = Path(__file__).parent.parent
 LONGEST = 300.0
 """Run time (s) after which a run is ended."""
 MOST_STEPS = 2000
+ROUNDING = 1e-12
+"""Times (s) closer than that are one instant."""
 NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBERS = ("Real", "Integer", "Boolean", "Float32", "Float64")
 
@@ -121,15 +123,10 @@ def choose_signals(path: Path) -> list[str]:
     return list(dict.fromkeys(v.name for v in outputs or states))
 
 
-def takes_each_step(path: Path) -> bool:
-    """Whether an FMU for model exchange is told of each step of the solver."""
+def has_states(path: Path) -> bool:
+    """Whether it is an FMU for model exchange whose states a solver integrates."""
     model = _describe(path)
-    exchange = model and model.modelExchange
-    if not exchange or not model.numberOfContinuousStates:
-        return False
-    if model.fmiVersion == "2.0":
-        return not exchange.completedIntegratorStepNotNeeded
-    return bool(exchange.needsCompletedIntegratorStep)
+    return bool(model and model.modelExchange and model.numberOfContinuousStates)
 
 
 def choose_inputs(path: Path) -> dict[str, tuple[Any, Any]]:
@@ -299,9 +296,9 @@ def _compare_tables(
     """At our times. FMPy has a row before and after each event: the last of an instant is what
     holds from there, but for the instant `at` (s), where our row stands before inputs change."""
     time = ours["time"]
-    rows = np.searchsorted(theirs["time"], time + 1e-9, side="right") - 1
+    rows = np.searchsorted(theirs["time"], time + ROUNDING, side="right") - 1
     if at in time:
-        rows[time == at] = np.searchsorted(theirs["time"], at - 1e-9)
+        rows[time == at] = np.searchsorted(theirs["time"], at - ROUNDING)
     if (late := np.abs(theirs["time"][rows] - time).max()) > 1e-9:
         return Comparison(len(time), hapticlink=words, fmpy=f"its rows end {late:g} s earlier")
     largest, first, outputs = (0.0, "", math.nan), math.inf, 0
