@@ -6,6 +6,7 @@ import sys
 import time
 import webbrowser
 from contextlib import ExitStack, suppress
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -144,7 +145,7 @@ def view(
         from hapticlink.visualization.live_page.session import LiveSession
 
         settings = {SPEED: speed} if speed != 1.0 else None
-        session = LiveSession(read, link, root, hl.RealTime, settings)
+        session = LiveSession(read, link, root, partial(hl.RealTime, speed=speed), settings)
         with suppress(Interrupted, hl.RunInterrupted):
             session.run()
     for folder in session.recordings:
