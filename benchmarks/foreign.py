@@ -300,12 +300,13 @@ def _about(row: Row) -> tuple[str, ...]:
 
 
 def _causes(compared: list[Row]) -> Iterator[str]:
-    """Why runs differ: rounding of communication points, where they are not exact in binary, and
-    steps of the solver for model exchange."""
+    """Why runs differ: rounding of communication points, where they are not exact in binary, the
+    mode in which FMPy sets inputs, and steps of the solver for model exchange."""
     unequal = [row for row in compared if not _comparison(row).equal]
     differ = [row for row in unequal if row["interface"] != "model-exchange"]
-    inexact = [row for row in differ if not math.log2(int(row["rate_hz"])).is_integer()]
-    if inexact:
+    exact = [row for row in differ if math.log2(int(row["rate_hz"])).is_integer()]
+    files = {row["file"] for row in exact}
+    if inexact := [row for row in differ if row["file"] not in files]:
         names = _listed(sorted({f"{_name(row)}" for row in inexact}))
         first = min(_comparison(row).first for row in inexact)
         yield (
@@ -314,6 +315,14 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
             f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
             "two next to the rate, where both call the FMU with the same bits."
+        )
+        yield ""
+    if exact:
+        yield (
+            f"**{_listed(sorted({_name(row) for row in exact}))}** differ at any rate once their "
+            "inputs have changed. They declare event mode, in which FMPy sets continuous inputs, "
+            "too; hapticlink sets these in step mode "
+            "([which is nearer](../../docs/foreign-fmus.md#inputs-in-event-mode))."
         )
         yield ""
     exchange = [row for row in unequal if row["interface"] == "model-exchange"]
