@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16390,
     "programs": 1027,
-    "analysis": 8890,
+    "analysis": 8895,
     "visualization": 3688,
     "api": 635,
     "commands": 1619,

@@ -10,7 +10,8 @@ these parameters follows from the singular values of their Hankel matrix (B. L. 
 Effective construction of linear state-variable models from input/output functions,
 Regelungstechnik 14, 1966; S. Kung, A new identification and model reduction algorithm via singular
 value decomposition, 1978). It is checked on inputs that took no part: all of them at random, longer
-than the pulses and later, so that what changes with time shows, too.
+than the pulses and later, so that what changes with time shows, too; and from the start on, as a
+law may be another one until it rests (a soft start).
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ class NotIdentified(Exception):
 @dataclass(frozen=True, eq=False)
 class IdentifiedSystem:
     """The system of the module. error: largest difference of an output on the inputs that took no
-    part, relative to its largest response."""
+    part, relative to its largest response; early: the same in the first SETTLING steps."""
 
     A: Matrix
     B: Matrix
@@ -59,6 +60,7 @@ class IdentifiedSystem:
     u0: Vector
     y0: Vector
     error: float
+    early: float
 
     @property
     def order(self) -> int:
@@ -100,9 +102,16 @@ def identify(respond: Respond, u0: Vector, names: Sequence[str]) -> IdentifiedSy
     A, B, C = _realise(markov[1:])
     D = markov[0]
     found = IdentifiedSystem(
-        A, B / pulses, scale[:, None] * C, scale[:, None] * D / pulses, u0, rest[-1], 0.0
+        A, B / pulses, scale[:, None] * C, scale[:, None] * D / pulses, u0, rest[-1], 0.0, 0.0
     )
-    return replace(found, error=_check(found, respond, pulses))
+    early = _error(found, respond, pulses, 0, SETTLING)
+    if not (error := _error(found, respond, pulses, SETTLING + SETTLING // 8, CHECKED)) <= EXACT:
+        raise NotIdentified(
+            f"a linear system of order {found.order}, identified by pulses, errs by {error:.2g} of "
+            f"its response to other inputs: it is not linear, has a memory of more than "
+            f"{LENGTH // 2} steps, or changes with time"
+        )
+    return replace(found, error=error, early=early)
 
 
 def _rounding(rest: Matrix) -> Vector:
@@ -132,24 +141,17 @@ def _realise(markov: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     return A, (root[:, None] * Vt[:r])[:, :n_u], (U[:, :r] * root)[:n_y]
 
 
-def _check(found: IdentifiedSystem, respond: Respond, pulses: Vector) -> float:
-    """The error on inputs that took no part. Raises NotIdentified where it is larger than EXACT."""
-    first = SETTLING + SETTLING // 8
-    inputs = np.tile(found.u0, (first + CHECKED, 1))
+def _error(
+    found: IdentifiedSystem, respond: Respond, pulses: Vector, first: int, steps: int
+) -> float:
+    """The error on inputs that took no part, in so many steps from the first on."""
+    inputs = np.tile(found.u0, (first + steps, 1))
     rest = respond(inputs)[first:]
-    draws = np.random.default_rng(1).uniform(-1.0, 1.0, (CHECKED, len(pulses)))
-    inputs[first:] += pulses * draws
+    inputs[first:] += pulses * np.random.default_rng(1).uniform(-1.0, 1.0, (steps, len(pulses)))
     moved = respond(inputs)[first:] - rest
     x, predicted = np.zeros(found.order), np.empty_like(moved)
     for k, du in enumerate(inputs[first:] - found.u0):
         predicted[k] = found.C @ x + found.D @ du
         x = found.A @ x + found.B @ du
     largest = np.maximum(np.abs(moved).max(axis=0), _rounding(rest))
-    error = float((np.abs(predicted - moved).max(axis=0) / largest).max(initial=0.0))
-    if not error <= EXACT:
-        raise NotIdentified(
-            f"a linear system of order {found.order}, identified by pulses, errs by {error:.2g} of "
-            f"its response to other inputs: it is not linear, has a memory of more than "
-            f"{LENGTH // 2} steps, or changes with time"
-        )
-    return error
+    return float((np.abs(predicted - moved).max(axis=0) / largest).max(initial=0.0))

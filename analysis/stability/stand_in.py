@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.stability.identified_response import (
+    EXACT,
+    SETTLING,
     IdentifiedSystem,
     NotIdentified,
     identify,
@@ -37,17 +39,22 @@ Known = dict[tuple[Any, ...], IdentifiedSystem]
 @dataclass(frozen=True)
 class StandIn:
     """What stands in the place of an FMU, for the record: its order, and its largest error on
-    inputs that took no part, relative to the largest response of the output."""
+    inputs that took no part, relative to the largest response of the output, at rest and `early`,
+    in its first steps."""
 
     fmu: str
     order: int
     error: float
+    early: float
 
     def __str__(self) -> str:
+        other = (
+            f"; its law is another one in its first {SETTLING} steps, on which there is no verdict"
+        )
         return (
             f"{self.fmu}: its state cannot be read; a linear system of order {self.order} stands "
             f"for it, identified by its response to pulses; on other inputs it errs by "
-            f"{self.error:.1g} of the largest response"
+            f"{self.error:.1g} of the largest response{other * (not self.early <= EXACT)}"
         )
 
 
@@ -55,7 +62,7 @@ def find_stand_ins(known: Known) -> tuple[StandIn, ...]:
     """Of each FMU the one with the largest error."""
     worst: dict[str, StandIn] = {}
     for (name, *_), found in known.items():
-        each = StandIn(name, found.order, found.error)
+        each = StandIn(name, found.order, found.error, found.early)
         worst[name] = max(worst.get(name, each), each, key=lambda s: s.error)
     return tuple(worst.values())
 
