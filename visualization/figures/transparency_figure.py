@@ -54,5 +54,5 @@ def _finding(found: Sequence[Transparency]) -> str:
     if np.isinf(worst):
         return f"force and direction are right up to {HERTZ[-1]:g} Hz"
     if not worst:
-        return f"the inertia is wrong from {HERTZ[0]:g} Hz on"
+        return f"the inertia is wrong already at {HERTZ[0]:g} Hz"
     return f"the inertia is felt right up to {short(worst)} Hz"
