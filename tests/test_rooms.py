@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16382,
     "programs": 1027,
     "analysis": 8947,
-    "visualization": 3680,
+    "visualization": 3687,
     "api": 635,
     "commands": 1612,
 }
