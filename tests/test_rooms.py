@@ -34,8 +34,8 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16390,
     "programs": 1027,
-    "analysis": 8890,
-    "visualization": 3688,
+    "analysis": 8947,
+    "visualization": 3695,
     "api": 635,
     "commands": 1619,
 }

@@ -22,7 +22,6 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import (
-    ENVIRONMENT_WRENCH,
     MOBILITIES,
 )
 
@@ -64,9 +63,8 @@ class Feel:
         if null:
             n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
             found["constraint"] = n / PLANE.distance(n)
-        F = place.signal(ENVIRONMENT_WRENCH)
-        F = F if rendered.whole or not len(F) else felt.T @ (felt @ F)
-        if len(F) and (size := float(PLANE.distance(F))):
+        F = place.contact if rendered.whole else felt.T @ (felt @ place.contact)
+        if size := float(PLANE.distance(F)):
             found["contact"] = F / size
         if not found:
             raise InputFault(

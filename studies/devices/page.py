@@ -80,8 +80,10 @@ def _rendered(row: dict[str, Any]) -> str:
 
 def _error(row: dict[str, Any], sensing: str) -> str:
     distance, reason, time = row["errors"][sensing]
-    ended = "" if reason == "duration" else f" ({reason} at {time:.3g} s)"
-    return f"{short(distance)}{ended}"
+    if reason == "duration":
+        return short(distance)
+    why = "where the handle leaves the workspace" if reason == "stop_when" else reason
+    return f"{short(distance)} until {time:.3g} s, {why}"
 
 
 def _check(row: dict[str, Any], check: dict[str, Any]) -> str:
