@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7456,
+    "components": 7461,
     "fmus": 2992,
-    "orchestrator": 16390,
+    "orchestrator": 16396,
     "programs": 1027,
-    "analysis": 8947,
+    "analysis": 8974,
     "visualization": 3695,
     "api": 635,
     "commands": 1619,

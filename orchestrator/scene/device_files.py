@@ -3,24 +3,22 @@
 
 from __future__ import annotations
 
-import importlib.resources
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.components.specs.device import Device, DeviceBody
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, near, shorten, unknown
+from hapticlink.orchestrator.scene.find_scene import list_shipped
 from hapticlink.orchestrator.scene.merge import merge
 from hapticlink.orchestrator.scene.toml_keys import (
     LARGEST,
     Path,
     Place,
     Problem,
-    key_lines,
-    loads,
+    read_document,
     value,
 )
 
@@ -47,13 +45,9 @@ class DeviceBodyTable(DeviceBody):
     """The body whose mass, inertia and centre it has, where it does not say otherwise."""
 
 
-@cache
 def list_devices() -> dict[str, Any]:
     """The device files that are shipped with the package, by name."""
-    folder = importlib.resources.files("hapticlink.scenes.devices")
-    names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
-    files = {entry.name.removesuffix(".toml"): entry for entry in names}
-    return dict(sorted(files.items()))
+    return list_shipped("hapticlink.scenes.devices")
 
 
 def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
@@ -170,10 +164,10 @@ def _read(
         raise InputFault(f"{shorten(name)}: the last of {MAX_EXTENDED} files, each over the next")
     file, text, where = find_device(name, folder)
     try:
-        tables = loads(text)
+        tables, own = read_document(text)
     except ValueError as error:
         raise InputFault(f"{file}: not TOML: {error}") from error
-    lines = {key: (file, line) for key, line in key_lines(text).items()}
+    lines = {key: (file, line) for key, line in own.items()}
     base = tables.pop("extends", None)
     if base is None:
         return tables, lines

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -349,6 +350,28 @@ def test_a_crashed_process_takes_one_run(foreign: Path, tmp_path: Path) -> None:
     assert status("sweep", foreign, "--vary", vary, "--out", out, "--jobs", 2) == 0
     assert ends(out) == ["duration", "died", "duration"]
     assert len(list((out / "rows").iterdir())) == 2  # the next sweep tries the dead one again
+
+
+def pids(batch: pool.Batch) -> list[row.Row]:
+    if batch[0].key == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [{"pid": os.getpid()} for _ in batch]
+
+
+def test_processes_are_kept_for_further_rounds_and_replaced_where_one_dies() -> None:
+    def round_of(*keys: str) -> list[object]:
+        batches = [[Job({}, None, key)] for key in keys]
+        return [made.get("pid") for _, made in pool.in_processes(pids, batches, 1)]
+
+    with pool.keep_processes():
+        (first,), again = round_of("a"), round_of("b", "c")
+        assert again == [first, first]
+        assert round_of("dies") == [None]
+        (new,) = round_of("a")
+        assert new != first
+        assert round_of("b") == [new]
+    assert round_of("a") != [new]
+    assert not multiprocessing.active_children()
 
 
 def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_not(
