@@ -588,3 +588,16 @@ def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
 
 def test_the_run_time_is_the_last_column():
     assert table.columns([{"run_time_s": 1.0, "b": 2.0}, {"a": 3.0}]) == ["b", "a", "run_time_s"]
+
+
+def test_points_of_one_rate_are_in_one_batch() -> None:
+    """Whichever key varies first; a refused point is in one of them."""
+    rates = ("20", "30", "nothing", "40")
+    points = [
+        {"graphics.rate": rate, "hand.wrench": f"[{x}, 0, 0]"} for x in range(8) for rate in rates
+    ]
+    jobs = points_of.jobs("closed-loop-ideal", (), points)
+    batches = run_sweep.batches_of(jobs, 1)
+    assert [len({job.point["graphics.rate"] for job in batch}) for batch in batches] == [1] * 4
+    assert sorted(map(id, jobs)) == sorted(id(job) for batch in batches for job in batch)
+    assert [len(batch) for batch in run_sweep.batches_of(jobs, 4)] == [2] * 16
