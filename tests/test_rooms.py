@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7456,
+    "components": 7468,
     "fmus": 2992,
-    "orchestrator": 16418,
+    "orchestrator": 16421,
     "programs": 1027,
-    "analysis": 8890,
+    "analysis": 8911,
     "visualization": 3680,
     "api": 635,
     "commands": 1612,
