@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16382,
     "programs": 1027,
-    "analysis": 8890,
+    "analysis": 8893,
     "visualization": 3680,
     "api": 635,
     "commands": 1612,
