@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7461,
+    "components": 7473,
     "fmus": 2992,
-    "orchestrator": 16396,
+    "orchestrator": 16459,
     "programs": 1027,
-    "analysis": 8974,
-    "visualization": 3695,
+    "analysis": 9004,
+    "visualization": 3696,
     "api": 635,
     "commands": 1619,
 }
