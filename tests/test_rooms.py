@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7456,
+    "components": 7482,
     "fmus": 2992,
-    "orchestrator": 16382,
+    "orchestrator": 16411,
     "programs": 1027,
-    "analysis": 8890,
+    "analysis": 8934,
     "visualization": 3680,
     "api": 635,
     "commands": 1612,

@@ -62,11 +62,11 @@ class Feel:
         vectors = felt.T @ vectors
         null = [S @ vectors[:, i] for i in np.flatnonzero(values < CONSTRAINED * values[-1])]
         if null:
-            n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
-            found["constraint"] = n / PLANE.distance(n)
+            n = max(null, key=lambda wrench: float(linkage.space.distance(wrench)))
+            found["constraint"] = n / linkage.space.distance(n)
         F = place.signal(ENVIRONMENT_WRENCH)
         F = F if rendered.whole or not len(F) else felt.T @ (felt @ F)
-        if len(F) and (size := float(PLANE.distance(F))):
+        if len(F) and (size := float(linkage.space.distance(F))):
             found["contact"] = F / size
         if not found:
             raise InputFault(
