@@ -52,8 +52,6 @@ DAMPINGS = 2.0 ** np.arange(-4, 7)
 CALMED = 0.1
 """The smallest decay rate (1/s) that counts as damped enough for a free handle. Where small motions
 decay more slowly, large ones around a pose where the constrained directions change can grow."""
-TURNING = 1e-3
-"""Their rotational damping (N.m.s/rad) over that of translations (N.s/m)."""
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ class InHands:
         for name in names if late else ():
             if user_of_block(name, CONTROLLER) is not None:
                 period = period.delayed(name, late)
-        self._T, self._seconds = place.T, place.map.period
+        self._T, self._seconds, self._space = place.T, place.map.period, place.space
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
         self._period = period.fused(self._users)
 
@@ -203,7 +201,9 @@ class InHands:
     def _leading(self, hand: Hand | None) -> tuple[Mode, LinearPeriod]:
         period = self._period
         if hand is not None:
-            period = period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
+            period = period.held(
+                dict.fromkeys(self._users, hand_slopes(hand, self._T, self._space))
+            )
         return judged_modes(modes(period.linear, self._seconds))[0], period
 
     def _verdict(self, mode: Mode) -> str:
@@ -213,7 +213,7 @@ class InHands:
     def _damping(self) -> float:
         """The least damping of a free handle with which it comes to rest."""
         for b in DAMPINGS:
-            if self._leading(free(b, TURNING * b))[0].growth < -CALMED:
+            if self._leading(free(b, self._space))[0].growth < -CALMED:
                 return float(b)
         return float(np.inf)
 

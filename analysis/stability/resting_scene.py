@@ -20,6 +20,7 @@ from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -53,7 +54,8 @@ def _is_felt(mode: Mode) -> bool:
 class RestingScene:
     """A scene at its equilibrium in the hand that it has, searched from a `start`, such as the
     `equilibrium` of the same scene at other rates. T: the haptic period (s). gains: those of its
-    laws, with which the map begins `scaled`. Raises InputFault where there is no equilibrium."""
+    laws, with which the map begins `scaled`. space: of its ports. Raises InputFault where there is
+    no equilibrium."""
 
     def __init__(
         self,
@@ -63,8 +65,10 @@ class RestingScene:
         start: Vector | None = None,
         scaled: float = 1.0,
         linkage: Linkage | None = None,
+        space: PortSpace = PLANE,
     ) -> None:
-        self.map, self.gains, self.T, self._linkage = map_, gains, T, linkage
+        self.map, self.gains, self.T = map_, gains, T
+        self._linkage, self.space = linkage, space
         if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
             start = map_.start
         self._home = equilibrium(map_, start)
@@ -103,7 +107,8 @@ class RestingScene:
         """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`
         in a spring hand of the stiffness `hand` (N/m)."""
         try:
-            period = self.period(scales).held({HAND: hand_slopes(spring_hand(hand), self.T)})
+            slopes = hand_slopes(spring_hand(hand, self.space), self.T, self.space)
+            period = self.period(scales).held({HAND: slopes})
             all_modes = modes(period.linear, self.map.period)
         except (FmuFault, InputFault):  # diverges at once
             return False
@@ -175,7 +180,7 @@ def resting_system(
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
             map_ = stack.enter_context(open_lifted_map(softer, read, work))
-            return RestingScene(map_, gains, T, start, scale, read.linkage)
+            return RestingScene(map_, gains, T, start, scale, read.linkage, read.space)
 
         try:
             place = rested(1.0)

@@ -61,10 +61,10 @@ class Feel:
         vectors = felt.T @ vectors
         null = [S @ vectors[:, i] for i in np.flatnonzero(values < CONSTRAINED * values[-1])]
         if null:
-            n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
-            found["constraint"] = n / PLANE.distance(n)
+            n = max(null, key=lambda wrench: float(linkage.space.distance(wrench)))
+            found["constraint"] = n / linkage.space.distance(n)
         F = place.contact if rendered.whole else felt.T @ (felt @ place.contact)
-        if size := float(PLANE.distance(F)):
+        if size := float(linkage.space.distance(F)):
             found["contact"] = F / size
         if not found:
             raise InputFault(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.port_space import POINT
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
 from hapticlink.components.specs.device import Device, Handle, NumberOrigins
 from hapticlink.components.specs.driver import Driver
@@ -137,7 +138,7 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
             settings["clutch"] = True
         if user in partial:
             settings["handle"] = partial[user]
-        if scene.linkage and scene.linkage.dimension > 2:
+        if scene.space == POINT:
             settings["space"] = "point"
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
     devices = {

@@ -15,7 +15,7 @@ from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.joint_coordinates import JointCoordinates
 from hapticlink.components.device.models import device_model
 from hapticlink.components.device.pose_coordinates import PoseCoordinates
-from hapticlink.components.device.workspace import extent_along, margin, workspace
+from hapticlink.components.device.workspace import extents_along, margin, workspace
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
@@ -34,6 +34,7 @@ KINDS = {
     "pantograph-mk-ii": PoseCoordinates,
     "stage": JointCoordinates,
     "paddle": JointCoordinates,
+    "ideal-3": JointCoordinates,
 }
 RANGED = {"joint.a_left.range": [0.5, 4.0]}
 
@@ -89,10 +90,11 @@ def test_the_inertia_is_that_of_the_kinetic_energy(name):
     model, p = device_model(spec), device_model(spec).numbers
     n, k = len(model.start_place), model.directions.size
     z, y = ca.SX.sym("z", n), ca.SX.sym("v", k)
-    frames = model.frames(z, p)
+    frames, d = model.frames(z, p), spec.linkage.dimension
+    centers = {b.name: ca.SX(ca.DM([*(b.center or (0.0, 0.0)), 0.0][:d])) for b in spec.body}
     parts = [
-        ca.vertcat(frames[b.name].point(p.get(f"{b.name}.center")), frames[b.name].angle)
-        for b in spec.body
+        ca.horzcat(frames[name].point(center), frames[name].rotation)
+        for name, center in centers.items()
     ]
     placed = ca.Function("placed", [z], [ca.horzcat(*parts), model.motor_angles(z, p)])
     moved = ca.Function("moved", [z, y], [model.moved(z, y, p)])
@@ -100,12 +102,17 @@ def test_the_inertia_is_that_of_the_kinetic_energy(name):
     v, small = np.array([0.3, -0.2, 2.0])[:k], 1e-6
     after, before = (moved(model.start_place, way * small * v) for way in (1, -1))
     (bodies, rotors), (bodies0, rotors0) = placed(after), placed(before)
-    rates = (np.array(bodies) - np.array(bodies0)) / (2 * small)
+    rates = np.split((np.array(bodies) - np.array(bodies0)) / (2 * small), len(centers), axis=1)
+    at = np.split(np.array(placed(model.start_place)[0]), len(centers), axis=1)
     spins = (np.array(rotors) - np.array(rotors0)).ravel() / (2 * small)
-    twice = sum(
-        b.mass * (r[0] ** 2 + r[1] ** 2) + b.inertia * r[2] ** 2
-        for b, r in zip(spec.body, rates.T, strict=True)
-    )
+    twice = 0.0
+    for body, rate, placement in zip(spec.linkage.body, rates, at, strict=True):
+        turned = placement[:, 1:].T @ rate[:, 1:]  # [omega] in the body's axes
+        omega = np.zeros(3)
+        omega[2] = turned[1, 0]
+        if d == 3:
+            omega[:2] = turned[2, 1], turned[0, 2]
+        twice += body.mass * rate[:, 0] @ rate[:, 0] + omega @ body.inertia_tensor @ omega
     twice += sum(m.inertia * spin**2 for m, spin in zip(spec.motors, spins, strict=True))
     M, C = (np.array(value) for value in dynamics(model.start_place, v))
     assert v @ M @ v == pytest.approx(twice, rel=1e-6)
@@ -130,7 +137,7 @@ def test_the_workspace_of_a_stage_is_its_ranges_and_that_of_a_paddle_its_arc():
         pytest.approx((-0.12, 0.12)),
     )
     assert margin(stage, np.array([[0.1, -0.115, 2.0]])) == pytest.approx([0.005])
-    assert extent_along(paddle) == pytest.approx(
+    assert extents_along(paddle)[0] == pytest.approx(
         [-0.07 * np.sin(0.8), 0.07 * np.sin(0.8)], abs=1e-4
     )
     assert margin(paddle, np.array([[0.2, 0.0, 0.0]]))[0] < 0  # farther than its lever
