@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7456,
+    "components": 7447,
     "fmus": 2992,
     "orchestrator": 16382,
     "programs": 1027,
     "analysis": 8890,
-    "visualization": 3680,
+    "visualization": 3766,
     "api": 635,
     "commands": 1612,
 }
