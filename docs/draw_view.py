@@ -27,8 +27,8 @@ SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] =
     "narrow": ("closed-loop", (400, 860), ((-0.02, 0.02), (0.012, 0.03))),
     "bennett": ("bennett.toml", (1280, 800), ((0.06, 0.05),)),
 }
-"""By file, the scene, shipped or of docs/space.md, the window (px), and a path of the mouse from the
-operational point (m, to the right and up)."""
+"""By file, the scene, shipped or of docs/space.md, the window (px), and a path of the mouse from
+the operational point (m, to the right and up)."""
 OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
 """By file, the point of the user who drags in a second window, and that one's path (m)."""
 

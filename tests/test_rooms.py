@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16382,
     "programs": 1027,
-    "analysis": 8890,
+    "analysis": 8941,
     "visualization": 3766,
     "api": 635,
     "commands": 1612,

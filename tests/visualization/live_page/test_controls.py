@@ -55,7 +55,9 @@ def test_a_change_that_is_refused_is_not_kept() -> None:
         for message in (SetControl("set", key, "none"), SetControl("set", "holds.x", "zoh")):
             with pytest.raises(hl.InputFault, match=r"^no hold 'none'|^no control"):
                 controls.apply(message)
-        with pytest.raises(hl.InputFault, match="^at: this hand is pulled to a place of 2 numbers"):
+        with pytest.raises(
+            hl.InputFault, match=r"^at: this hand is pulled to a place of 2 numbers"
+        ):
             controls.apply(Hand("hand", (0.1, 0.2, 0.3)))
         live.stop()
 
