@@ -82,9 +82,9 @@ export class FirstMinute {
   }
 
   // A frame of the run that is shown, at its time (s), and whether that has ended.
-  add(t, { handle, F_hand }, ended) {
+  add(t, { handle, F_hand }, ended, dimension) {
     if (!this.offered) return;
-    this.swings.add(t, handle);
+    this.swings.add(t, handle, dimension);
     const { vibration, watched, trace } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
     if (words !== this.felt.textContent) this.felt.textContent = words;
     this.light.className = `light ${light}`;

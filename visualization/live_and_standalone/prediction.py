@@ -14,6 +14,7 @@ from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
 from hapticlink.analysis.stability.hands import HANDS
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import DRIFT
+from hapticlink.analysis.stability.poses import require_planar_port
 from hapticlink.analysis.stability.resting_scene import resting_system
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand
@@ -27,7 +28,7 @@ from hapticlink.orchestrator.system.changes import with_hold
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
-from hapticlink.visualization.live_and_standalone.viewed_scene import DAMPING, STIFFNESS
+from hapticlink.visualization.live_and_standalone.viewed_scene import mouse
 
 MAX_COST = {"native": 2e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
@@ -89,8 +90,9 @@ def judge_hands(
     words. Raises InputFault where its computation would take long, and as `stability` does."""
     if settings.get(JITTER):
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
-    if scene.hand is None:
+    if scene.hand is None or scene.linkage is None:
         raise InputFault("nobody holds the mechanism")
+    require_planar_port(scene)
     changed = _at_rate(scene, settings.get(RATE))
     with (
         interrupt.defer_signals(),
@@ -108,7 +110,8 @@ def judge_hands(
                 for c in whole.connections
             ),
         )
-        hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
+        stiffness, damping = mouse(scene.linkage)
+        hands = {MOUSE: SpringHand(stiffness=stiffness, damping=damping), **HANDS}
         without, _ = frozen_nonlinearities.without(system)
         calming = {c.hold for c in system.connections if has_friction(c)}
         beside = "".join(f", without the friction of hold {hold}" for hold in calming)
