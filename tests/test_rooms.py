@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7473,
+    "components": 7490,
     "fmus": 2992,
-    "orchestrator": 16459,
+    "orchestrator": 16488,
     "programs": 1027,
-    "analysis": 9004,
-    "visualization": 3696,
+    "analysis": 9100,
+    "visualization": 3782,
     "api": 635,
     "commands": 1619,
 }
