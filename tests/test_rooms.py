@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7456,
+    "components": 7490,
     "fmus": 2992,
-    "orchestrator": 16383,
+    "orchestrator": 16481,
     "programs": 1027,
-    "analysis": 8895,
-    "visualization": 3688,
+    "analysis": 9100,
+    "visualization": 3783,
     "api": 635,
     "commands": 1619,
 }

@@ -24,7 +24,7 @@ from hapticlink.visualization.live_and_standalone.choose_model import (
     can_have_model,
     has_model,
 )
-from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS
+from hapticlink.visualization.live_and_standalone.viewed_scene import mouse
 
 GAINS = (HAND, CONTROLLER)
 """Blocks of a user whose tunable parameters are gains; those of the mechanism are, too."""
@@ -161,5 +161,6 @@ def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64],
             gains[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
     for name in (stiffness(user) for user in users(scene)):
         if name in gains:
-            gains[name] = np.array(STIFFNESS), gains[name][1]
+            assert scene.linkage
+            gains[name] = np.array(mouse(scene.linkage)[0]), gains[name][1]
     return gains

@@ -191,13 +191,14 @@ class Pages:
 
     def _tell(self, message: messages.Message) -> None:
         """Tell the run that a change is of, or both of a hand, a button and the speed."""
-        of_one = isinstance(message, messages.SetControl) and message.key != SPEED
-        of_second = of_one and message.b and self._second
+        control = message if isinstance(message, messages.SetControl) else None
+        of_one = control is not None and control.key != SPEED
+        of_second = of_one and control and control.b and self._second
         if not of_second:
             write_message(self._out, message)
         if self._second and (of_second or not of_one):
             self._second.send(message)
-        if isinstance(message, messages.SetControl) and message.key == MODEL:
+        if control and control.key == MODEL:
             if of_second:
                 self._newest_of_second.pop("scene", None)  # both begin anew with the next one
             else:

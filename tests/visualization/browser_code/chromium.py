@@ -144,6 +144,10 @@ def has_its_first_minute(page: Page) -> None:
     """Pulled at 60 Hz the linkage is steady, at 11 Hz it vibrates, and with a softer coupling at
     that rate it does not: as the page says, and as the frames have it."""
     page.until("!document.getElementById('first').hidden")
+    assert page.get("document.getElementById('ends').innerText.split(/\\s*\\n/)") == [
+        "10 Hz",
+        "60 Hz",
+    ]
     page.page.evaluate(COLLECT)
     pressed = "document.getElementById('remedy').ariaPressed === "
     rate = "document.getElementById('hertz').textContent === "
