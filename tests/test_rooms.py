@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7461,
     "fmus": 2992,
-    "orchestrator": 16388,
+    "orchestrator": 16386,
     "programs": 1027,
     "analysis": 8917,
     "visualization": 3680,
     "api": 635,
-    "commands": 1612,
+    "commands": 1613,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
