@@ -129,14 +129,16 @@ def view(
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
     with _server(host, port, token, *second_run) as link:
         import hapticlink as hl
-        from hapticlink.api.board_start import start_at_handle
         from hapticlink.api.runs import with_board
         from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
         board = write_options(with_board(device)) if device else ()
         read = load_viewed_scene(scene, (*changes.options, *board))  # while the server starts
-        read = start_at_handle(read, wait_for_enter)
+        if driver_of(read, ""):
+            from hapticlink.api.board_start import start_at_handle  # slow to load
+
+            read = start_at_handle(read, wait_for_enter)
         served_port = _port(link, host, port)
         _show(read.title, host, served_port, token, browser)
         hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"

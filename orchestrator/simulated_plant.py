@@ -138,7 +138,7 @@ def attach(
     """The system, whose device that asks for a simulated board gets the port of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    boards = [u for u in system.fmus if u.driver and not u.replayed]
+    boards = [u for u in system.fmus if u.driver and not u.stand_in]
     asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system

@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7490,
     "fmus": 2992,
-    "orchestrator": 16481,
+    "orchestrator": 16479,
     "programs": 1027,
     "analysis": 9100,
     "visualization": 3783,
     "api": 635,
-    "commands": 1619,
+    "commands": 1620,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""
