@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16406,
     "programs": 1027,
-    "analysis": 8896,
+    "analysis": 8901,
     "visualization": 3680,
     "api": 635,
     "commands": 1612,
