@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16445,
     "programs": 1027,
-    "analysis": 8901,
+    "analysis": 8902,
     "visualization": 3680,
     "api": 635,
     "commands": 1612,
