@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16445,
     "programs": 1027,
     "analysis": 8902,
-    "visualization": 3680,
+    "visualization": 3693,
     "api": 635,
     "commands": 1612,
 }
