@@ -35,9 +35,9 @@ CODE_LINES = {
     "orchestrator": 16421,
     "programs": 1027,
     "analysis": 8911,
-    "visualization": 3680,
-    "api": 635,
-    "commands": 1612,
+    "visualization": 3738,
+    "api": 645,
+    "commands": 1630,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -76,7 +76,17 @@ class Compare:
     on: bool
 
 
-Message = Hand | SetControl | Time | Compare
+@dataclass(frozen=True)
+class Answer:
+    """An answer to the question of that number of a trial."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["answer"]
+    question: int
+    given: Name
+
+
+Message = Hand | SetControl | Time | Compare | Answer
 
 
 @cache
