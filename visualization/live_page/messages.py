@@ -77,7 +77,7 @@ class Compare:
 
 
 @dataclass(frozen=True)
-class Answer:
+class TrialReply:
     """An answer to the question of that number of a trial."""
 
     __pydantic_config__ = STRICT
@@ -86,7 +86,7 @@ class Answer:
     given: Name
 
 
-Message = Hand | SetControl | Time | Compare | Answer
+Message = Hand | SetControl | Time | Compare | TrialReply
 
 
 @cache

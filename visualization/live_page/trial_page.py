@@ -56,7 +56,7 @@ class TrialPage:
         until = time.monotonic() + seconds
         while not interrupt.came() and time.monotonic() < until:
             for message in self._received():
-                answered = isinstance(message, messages.Answer) and message.question == number
+                answered = isinstance(message, messages.TrialReply) and message.question == number
                 if answered and message.given in offered:
                     return str(message.given)
             time.sleep(WAIT)

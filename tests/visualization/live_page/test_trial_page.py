@@ -27,25 +27,25 @@ ASKED = "document.querySelector('#answers button')"
 class Link:
     """A page whose answers are a function of the questions that it was sent."""
 
-    def __init__(self, answer: Callable[[dict[str, Any]], list[messages.Answer]]) -> None:
+    def __init__(self, answer: Callable[[dict[str, Any]], list[messages.TrialReply]]) -> None:
         self.sent: list[dict[str, Any]] = []
         self.alive, self._answer = True, answer
 
     def send(self, message: dict[str, Any], frame: bool = False) -> None:
         self.sent.append(message)
 
-    def received(self) -> list[messages.Answer]:
+    def received(self) -> list[messages.TrialReply]:
         asked = [m for m in self.sent if m["type"] == "question" and m["answers"]]
         return self._answer(asked[-1]) if asked else []
 
 
 def test_an_answer_is_one_to_its_question_and_nothing_tells_the_setting(tmp_path: Path) -> None:
-    def answer(asked: dict[str, Any]) -> list[messages.Answer]:
+    def answer(asked: dict[str, Any]) -> list[messages.TrialReply]:
         number = asked["question"]
-        late = messages.Answer("answer", number - 1, "2")  # of a button that was pressed twice
-        other = messages.Answer("answer", number, "3")
+        late = messages.TrialReply("answer", number - 1, "2")  # of a button that was pressed twice
+        other = messages.TrialReply("answer", number, "3")
         given = "1" if "which" in asked["text"] else "y"
-        return [late, other, messages.Answer("answer", number, given)]
+        return [late, other, messages.TrialReply("answer", number, given)]
 
     link = Link(answer)
     scene = load_viewed_scene("closed-loop-ideal", {"packaging": "python"}, 0.05)
