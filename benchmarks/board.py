@@ -67,7 +67,8 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             progress(rule, number * len(RULES) + i, times * len(RULES))
             if (rule, number) not in rests:
                 rests.add(rule, number, *_rest(rule, delay))
-    return page(*([*each.rows.values()] for each in (ticks, ways, rests)), seconds, command)
+    found = [[*rows.rows.values()] for rows in (ticks, ways, rests)]
+    return page(found[0], found[1], found[2], seconds, command)
 
 
 # --- ticks ----------------------------------------------------------------------------------
@@ -248,7 +249,8 @@ def _injected(how: str | signal.Signals, delay: float, room: Path) -> tuple[floa
         text = "".join(f"{key} = {toml(value, key)}\n" for key, value in keys.items())
         path.write_text(f'extends = "{SCENE}"\n{text}')
         program = PROGRAM.replace("INJECTION", snippet)
-        command = [sys.executable, "-c", program, path, room / "run", str(delay), str(duration)]
+        given = map(str, (path, room / "run", delay, duration))
+        command = [sys.executable, "-c", program, *given]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout
             if isinstance(how, signal.Signals):

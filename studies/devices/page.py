@@ -66,9 +66,9 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
         *alone,
         "",
         "With bias full and ideal sensing the law (4.6) asks for the acceleration that the "
-        "mechanism has, which has no part along constrained directions: errors of sampling alone "
-        "push the handle that way, so that it stays near for some seconds without a topology "
-        "controller. With velocity terms left out, or with observed forces, it leaves sooner.",
+        "mechanism has, which has no part along constrained directions: without a topology "
+        "controller errors of sampling alone push the handle that way, slowly. With velocity terms "
+        "left out, or with observed forces, more does.",
         "",
         "## Verdicts and runs",
         "",
