@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7468,
     "fmus": 2992,
-    "orchestrator": 16421,
+    "orchestrator": 16422,
     "programs": 1027,
     "analysis": 8911,
     "visualization": 3738,
