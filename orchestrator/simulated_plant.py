@@ -182,11 +182,11 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
         gc.disable()  # nothing below leaves cycles
         stack.enter_context(raise_priority())  # a board has a processor of its own
         while True:
-            ready, _, _ = select.select([end, 0], [], [], 1 / RATE)
+            ready, _, _ = select.select([end.fileno(), 0], [], [], 1 / RATE)
             if 0 in ready and not os.read(0, 1):
                 return
             now = time.monotonic()
-            if end not in ready:
+            if end.fileno() not in ready:
                 board.at(now)
             elif end is listener:
                 end = stack.enter_context(listener.accept()[0])
