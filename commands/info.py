@@ -130,7 +130,7 @@ def _draw(scene: Any, system: System, start: dict[str, float], out: Path) -> Non
 
     figures = {"blocks": block_diagram.figure(system, f"Blocks of: {scene.title}")}
     q = coordinates(start)
-    if q and scene.linkage.dimension == 2:
+    if q:
         figures["start"] = drawing.figure(scene, q)
     if device := described_devices(scene).get(""):
         title = f"Device and its workspace: {scene.title}"

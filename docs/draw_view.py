@@ -17,13 +17,18 @@ from typing import Any
 from playwright.sync_api import sync_playwright
 
 OUT = Path(__file__).parents[1] / "results" / "view"
+PAGE_OF_SPACE = Path(__file__).parent / "space.md"
+IN_SPACE = re.compile(r'^```toml title="(.+?)"\n(.*?)^```', re.DOTALL | re.MULTILINE)
+"""The scenes of a page, and what they are called."""
 SHOTS: dict[str, tuple[str, tuple[int, int], tuple[tuple[float, float], ...]]] = {
     "closed_loop": ("closed-loop", (1360, 820), ((-0.02, 0.02), (0.012, 0.03))),
     "enclosure": ("enclosure", (1360, 820), ((-0.01, 0.02), (-0.005, 0.035))),
     "two_users": ("two-users", (1360, 820), ((-0.01, 0.012),)),
     "narrow": ("closed-loop", (400, 860), ((-0.02, 0.02), (0.012, 0.03))),
+    "bennett": ("bennett.toml", (1280, 800), ((0.06, 0.05),)),
 }
-"""By file, the scene, the window (px), and a path of the mouse from the operational point (m)."""
+"""By file, the scene, shipped or of docs/space.md, the window (px), and a path of the mouse from
+the operational point (m, to the right and up)."""
 OTHERS = {"two_users": ("left", ((0.012, -0.012),))}
 """By file, the point of the user who drags in a second window, and that one's path (m)."""
 
@@ -39,7 +44,8 @@ OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
 (px), and where the mouse goes from the operational point (m)."""
 
 
-VIBRATES = "() => document.getElementById('said').innerText.match(/by (.+) mm/)?.[1] > 4"
+VIBRATES = """() => document.getElementById('said').innerText.match(/by (.+) mm/)?.[1] > 4
+    && !document.getElementById('ended').innerText"""
 
 
 def dragged(
@@ -79,6 +85,8 @@ def of_file(browser: Any, name: str) -> None:
 def main(names: Collection[str]) -> None:
     OUT.mkdir(exist_ok=True)
     with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
+        for title, scene in IN_SPACE.findall(PAGE_OF_SPACE.read_text(encoding="utf-8")):
+            (Path(folder) / title).write_text(scene, encoding="utf-8")
         browser = started.chromium.launch(
             executable_path="/usr/bin/chromium", args=["--no-sandbox", "--disable-gpu"]
         )

@@ -5,7 +5,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from hapticlink.components.specs.linkage import Body, Joint, Linkage, Loop, OperationalPoint
+from hapticlink.components.specs.linkage import (
+    Body,
+    Joint,
+    Linkage,
+    Loop,
+    OperationalPoint,
+    Spring,
+)
 
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
@@ -83,9 +90,14 @@ def plate(name, end, mass=0.3):
     """A thin rod from the origin of its frame to `end`, a hundredth as thick."""
     r = np.array(end)
     tensor = mass / 12 * (r @ r * 1.0001 * np.eye(3) - np.outer(r, r))
+    return body(name, mass, tensor, r / 2)
+
+
+def body(name, mass, tensor, center):
+    """A body with an inertia tensor about its centre of mass."""
     entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    center = tuple(float(v) for v in r / 2)
-    return Body(name=name, mass=mass, inertia=tuple(float(v) for v in entries), center=center)
+    inertia, at = (tuple(float(v) for v in of) for of in (entries, center))
+    return Body(name=name, mass=mass, inertia=inertia, center=at)
 
 
 def rssr(closure="spherical"):
@@ -109,6 +121,75 @@ def rssr(closure="spherical"):
         )
         loop = Loop(type="spherical", bodies=("rod", "rocker"), at=(span, rocker))
     return Linkage(body=tuple(bodies), joint=tuple(joints), loop=(loop,), operational_point=point)
+
+
+def slider_crank():
+    """The spatial rigid slider-crank mechanism of the IFToMM library: a crank of .08 m about x, a
+    rod of .3 m on a ball, and on a universal joint a slider along x. The crank's mass is at its
+    middle, the axes of the universal joint are x of the slider and the rod's normal to it, which
+    gives the rod the rates (1.92, -.96, .48) rad/s of the start."""
+    span = np.array([0.2, -0.1, -0.2])
+    along = span / np.linalg.norm(span)
+    across = np.cross(X, along)
+    bodies = (
+        Body(name="crank", mass=0.12, inertia=(1e-4, 1e-5, 1e-4), center=(0.0, 0.0, 0.04)),
+        body("rod", 0.5, 4e-3 * np.eye(3) - 3.6e-3 * np.outer(along, along), span / 2),
+        Body(name="slider", mass=2.0, inertia=1e-4),
+    )
+    end = {"parent": "crank", "at_parent": (0.0, 0.0, 0.08)}
+    joints = (
+        Joint(name="crank", child="crank", at_parent=(0.0, 0.1, 0.12), axis=X),
+        Joint(name="slider", type="prismatic", child="slider", at_parent=(0.2, 0.0, 0.0), axis=X),
+        Joint(name="rod", type="spherical", child="rod", **end),
+    )
+    ends = {"bodies": ("rod", "slider"), "at": (tuple(span.tolist()), (0.0, 0.0, 0.0))}
+    square = (tuple((across / np.linalg.norm(across)).tolist()), X)
+    return Linkage(
+        body=bodies,
+        joint=joints,
+        loop=(Loop(type="universal", **ends, axes=square),),
+        gravity=(0.0, 0.0, -9.81),
+        operational_point=OperationalPoint(body="slider"),
+        start_velocity={"crank": 6.0},
+    )
+
+
+def governor():
+    """The stiff flyball governor of the IFToMM library (A05): a shaft about z with two rods of 1 m
+    30 degrees below the horizontal, 5 kg at their ends, and a slider on springs to their middles.
+    Shaft and rods are .01 m thick, the slider is a cube of .1 m, of 3,000 kg/m3 all."""
+    thick, ball = 1e-4, 5.0
+    thin = (0.3 / 12 * (1 + thick), 0.3 / 12 * (1 + thick), 0.3 / 6 * thick)
+    bodies = [
+        Body(name="shaft", mass=0.3, inertia=thin, center=(0.0, 0.0, 0.5)),
+        Body(name="slider", mass=3.0, inertia=3.0 * 0.1**2 / 6),
+    ]
+    slide = {"parent": "shaft", "at_parent": (0.0, 0.0, 0.5), "axis": Z}
+    joints = [
+        Joint(name="shaft", child="shaft", axis=Z),
+        Joint(name="slider", type="prismatic", child="slider", **slide),
+    ]
+    springs = []
+    for name, side in (("right", 1.0), ("left", -1.0)):
+        out = np.array([side * math.cos(math.pi / 6), 0.0, -math.sin(math.pi / 6)])
+        sideways = np.eye(3) - np.outer(out, out)
+        center = (0.3 * 0.5 + ball) / (0.3 + ball)
+        apart = 0.3 * (0.5 - center) ** 2 + ball * (1 - center) ** 2
+        tensor = thin[2] * np.outer(out, out) + (thin[0] + apart) * sideways
+        bodies.append(body(name, 0.3 + ball, tensor, center * out))
+        hinge = {"parent": "shaft", "at_parent": (side * 0.05, 0.0, 1.0), "axis": Y}
+        joints.append(Joint(name=name, child=name, **hinge))
+        at = ((side * 0.05, 0.0, 0.0), tuple((out / 2).tolist()))
+        spring = {"length": 0.5, "stiffness": 8e5, "damping": 4e4}
+        springs.append(Spring(bodies=("slider", name), at=at, **spring))
+    return Linkage(
+        body=tuple(bodies),
+        joint=tuple(joints),
+        spring=tuple(springs),
+        gravity=(0.0, 0.0, -9.81),
+        operational_point=OperationalPoint(body="slider"),
+        start_velocity={"shaft": 2 * math.pi},
+    )
 
 
 def dh_loop(links, angles):
@@ -151,16 +232,9 @@ def top(**changes):
     axis = np.array([math.sin(lean), 0.0, math.cos(lean)])
     along, across, mass, arm = 8e-4, 2e-3, 0.5, 0.06
     tensor = across * np.eye(3) + (along - across) * np.outer(axis, axis)
-    entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    body = Body(
-        name="top",
-        mass=mass,
-        inertia=tuple(float(v) for v in entries),
-        center=tuple((arm * axis).tolist()),
-    )
     spin = tuple((40.0 * axis).tolist())
     linkage = Linkage(
-        body=(body,),
+        body=(body("top", mass, tensor, arm * axis),),
         joint=(Joint(name="ball", type="spherical", child="top"),),
         operational_point=OperationalPoint(body="top", at=tuple((0.1 * axis).tolist())),
         gravity=(0.0, 0.0, -9.81),

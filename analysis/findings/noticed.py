@@ -21,6 +21,7 @@ from functools import reduce
 from itertools import combinations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
@@ -56,6 +57,8 @@ FAINTEST = 0.012
 J. Neurophysiology 81 (1999), 1548. Below 150 Hz their threshold rises by more than 12 dB an
 octave."""
 WINDOW = 0.25  # s
+AT_A_TIME = 64
+"""Windows of a run in memory at a time."""
 ROUNDING = 1e-9
 
 
@@ -141,18 +144,22 @@ def shaking(time: Vector, v: Vector) -> Shaking | None:
     if 0.5 / T <= VIBRATION or len(time) <= count:
         return None
     hertz = np.fft.rfftfreq(count, T)
-    band = hertz >= VIBRATION
+    band = slice(int(np.searchsorted(hertz, VIBRATION)), None)
     window = np.blackman(count)
     signs = np.where(2 * T * hertz[band] < 1 - ROUNDING, 2.0, 1.0)
     shares = signs / (count * (window @ window)) * np.sinc(hertz[band] * T) ** 2
-    largest, at, last = 0.0, 0, len(time) - 1 - count
-    for first in [*range(0, last, max(1, count // 4)), last]:
-        a = np.diff(v[:, first : first + count + 1]) / T
-        spectrum = np.fft.rfft((a - a.mean(axis=1, keepdims=True)) * window)[:, band]
-        squares = float((np.abs(spectrum) ** 2).sum(axis=0) @ shares)
-        if squares > largest:
-            largest, at = squares, first
-    return Shaking(float(np.sqrt(2.0 * largest)), float(time[at] + WINDOW / 2))
+    last = len(time) - 1 - count
+    firsts = [*range(0, last, max(1, count // 4)), last]
+    windows = sliding_window_view(np.diff(v) / T, count, axis=1)
+    squares = np.empty(len(firsts))
+    for k in range(0, len(firsts), AT_A_TIME):
+        a = windows[:, firsts[k : k + AT_A_TIME]]
+        spectrum = np.fft.rfft((a - a.mean(axis=2, keepdims=True)) * window)[..., band]
+        powers = (np.abs(spectrum) ** 2).sum(axis=0)
+        squares[k : k + AT_A_TIME] = [power @ shares for power in powers]
+    at = int(np.fmax(squares, 0.0).argmax())  # numbers that are none do not shake
+    middle = float(time[firsts[at]] + WINDOW / 2)
+    return Shaking(float(np.sqrt(2.0 * max(squares[at], 0.0))), middle)
 
 
 def describe_noticed(found: Mapping[str, Noticed]) -> Iterator[str]:

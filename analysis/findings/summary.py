@@ -258,6 +258,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     yield from _passivity(results, measures)
     yield from _describe_stops(results)
     yield from _contacts(results, measures)
+    yield from _idle_spins(results)
     for name, link in record.links.items():
         if link.lost or link.overtaken:
             yield (
@@ -334,6 +335,14 @@ def _contacts(results: Results, measures: Measures) -> Iterator[str]:
             yield from held_contacts.warn_of_held(held)
         else:
             yield from held_contacts.why_unchecked(results)
+
+
+def _idle_spins(results: Results) -> Iterator[str]:
+    joints = (results.record.scene["linkage"] or {}).get("joint", ())
+    if any(joint["type"] == "spherical" for joint in joints):
+        from hapticlink.analysis.findings import idle_spins
+
+        yield from idle_spins.warn_of_idle_spins(results)
 
 
 def _real_time(report: Mapping[str, Any]) -> Iterator[str]:

@@ -17,8 +17,8 @@ Pose = Sequence[float]
 
 
 def lines(device: Device, start: Pose) -> Iterator[str]:
-    """The extent of the workspace, what the device renders, and whether the start pose of a scene
-    is inside it."""
+    """The extent of the workspace, what the device renders, where its numbers are from, and whether
+    the start pose of a scene is inside the workspace."""
     if device.handle.along is not None:
         (extent,) = extents_along(device)
         yield f"along {write_pose(device.handle.along)}: {_range(extent)} m"
@@ -30,6 +30,7 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
         yield from _extents(device)
     if rendered := describe_rendered(device.handle):
         yield rendered
+    yield from (f"{what}: {told}" for what, told in vars(device.origin).items() if told)
     distance = float(margin(device, np.array([start]))[0])
     if distance < 0:
         yield f"warning: {describe_start_outside(device.space, start, distance)}"

@@ -120,7 +120,8 @@ def stability(
                 raise InputFault(fault)
             return found, broken_limit(changed, run)
 
-        judged = _judge(read, visits, hands, bounds, steps, rounded)
+        work = SharedWork(run=lambda: own_run)
+        judged = _judge(read, visits, hands, bounds, steps, rounded, work)
     return replace(judged, run_fault=own_fault)
 
 
@@ -164,10 +165,14 @@ def hands_of(hand: Hand, space: PortSpace = PLANE) -> dict[str, Hand]:
     return {**family, (OWN_FREE if damped else FREE): linearise_hand(hand)}
 
 
+def _simulate_span(read: Scene) -> Results:
+    return simulate_scene(read, {"duration": SPAN, "stop_when": ""})
+
+
 def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
     """The poses that a scene's own run visits, and that run."""
     assert read.linkage is not None
-    run = simulate_scene(read, {"duration": SPAN, "stop_when": ""})
+    run = _simulate_span(read)
     poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
@@ -186,7 +191,8 @@ def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> St
     steps = Steps(progress, 1)
     steps.begin("the run until it rests")
     try:
-        return _judge(read, _at_rest, hands, bounds, steps, rounded)
+        work = SharedWork(run=lambda: _simulate_span(read))
+        return _judge(read, _at_rest, hands, bounds, steps, rounded, work)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:
             raise
@@ -211,9 +217,10 @@ def _judge(
     bounds: Bounds,
     steps: Steps,
     rounded: str,
+    work: SharedWork,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
-    (visited, _), work = visits(read), SharedWork()
+    visited, _ = visits(read)
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(

@@ -20,7 +20,7 @@ from hapticlink.analysis.stability.hands import (
     standing,
 )
 from hapticlink.analysis.stability.lifted_map import hyperperiod
-from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.analysis.stability.stand_in import find_stand_ins
@@ -264,13 +264,9 @@ def _read_poses(run: Results) -> Table:
 
 
 def _contact_force(table: Table, linkage: Linkage) -> Matrix:
-    """F_env where a body touches something or a joint is at its limit. F_env alone does not tell:
-    it has other hands and efforts on joints, too."""
     if ENVIRONMENT_WRENCH not in table:
         return np.zeros((len(table["time"]), 3))
-    limited = any(j.limits for j in linkage.joint) or any(j.limits for j in linkage.loop)
-    touches = table[CONTACT_GAP] < 0.0 if CONTACT_GAP in table else np.zeros(1, bool)
-    return np.where((touches | limited)[:, None], table[ENVIRONMENT_WRENCH], 0.0)
+    return contact_force(linkage, table[ENVIRONMENT_WRENCH], table.get(CONTACT_GAP))
 
 
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
@@ -312,7 +308,7 @@ def at_pose(
 
 
 def _require_touch(pose: Pose, place: RestingScene) -> None:
-    if pose.touches and not place.touches:
+    if pose.touches and not place.contact.any():
         raise InputFault("it comes off what it touches")
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.models import device_model
+from hapticlink.components.evaluate_rows import evaluate_rows
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]
@@ -48,8 +49,7 @@ def torque_function(device: Device) -> ca.Function:
 
 def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
     """`torque_function` of wrenches and poses, a row each: (k, m)."""
-    torques = torque_function(device).map(len(wrenches))
-    return np.asarray(torques(wrenches.T, poses.T)).T
+    return evaluate_rows(torque_function(device), wrenches, poses)
 
 
 def torque_shares(device: Device, torques: Field) -> Field:

@@ -11,9 +11,9 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 
 from hapticlink.components.device.models import device_model
+from hapticlink.components.evaluate_rows import evaluate_rows
 from hapticlink.components.linkage.parameters import distance
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.quantities import Place
@@ -26,13 +26,7 @@ Range = tuple[float, float]
 def margin(device: Device, poses: Field) -> Field:
     """Smallest distance (m) of the device to its stops, shape (n,), at poses (x m, y m, theta rad)
     of shape (n, 3); negative outside the workspace."""
-    given, margins = np.ascontiguousarray(poses, float), np.zeros(len(poses))
-    buffer: Any
-    # A plain call takes ten times as long.
-    buffer, evaluate = _margin_function(device).map(len(poses)).buffer()
-    buffer.set_arg(0, given.data)
-    buffer.set_res(0, margins.data)
-    evaluate()
+    margins = evaluate_rows(_margin_function(device), poses)[:, 0]
     return np.where(np.isfinite(margins), margins, -np.inf)
 
 
@@ -164,6 +158,8 @@ def _around(side: Field, inside: Any) -> Field:
 
 
 def _on_grid(device: Device, x: Field, y: Field, theta: Field) -> Workspace:
+    from scipy.ndimage import label  # slow to load
+
     poses = np.stack(np.meshgrid(x, y, theta, indexing="ij"), axis=-1)
     margins = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3])
     start = device_model(device).start_pose

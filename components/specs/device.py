@@ -174,6 +174,29 @@ class Stops:
     """Damping."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class NumberOrigins:
+    """Where the numbers of a device are from: each text begins with `printed`, `measured` or
+    `assumed`, and says by whom."""
+
+    lengths: str = ""
+    """Of lengths and places of joints."""
+    masses: str = ""
+    """Of masses, centres and moments of inertia of bodies."""
+    motors: str = ""
+    """Of limits, ratios, inertias and friction of motors."""
+    encoders: str = ""
+    """Of resolutions of encoders."""
+
+    def __post_init__(self) -> None:
+        for key, text in vars(self).items():
+            if text and not text.startswith(_ORIGINS):
+                raise ValueError(f"{key} = {text!r} begins with none of {', '.join(_ORIGINS)}")
+
+
+_ORIGINS = ("printed", "measured", "assumed")
+
+
 @dataclass(frozen=True)
 class DrivenJoint:
     """A joint with its motor, all of whose numbers are given."""
@@ -202,6 +225,8 @@ class Device:
     title: str = ""
     """What the device is, in a few words."""
     description: str = ""
+    """What else there is to say of it."""
+    origin: NumberOrigins = field(default_factory=NumberOrigins)
     """Where its numbers are from."""
     body: tuple[DeviceBody, ...]
     """The bodies."""

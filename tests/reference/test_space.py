@@ -26,7 +26,17 @@ from hapticlink.components.specs.linkage import (
 )
 from tests.components.linkage.test_lifted import accelerations
 from tests.mechanisms import evaluated
-from tests.spatial_linkages import DELTA, bennett, bricard, delta, rssr, sarrus, top
+from tests.spatial_linkages import (
+    DELTA,
+    bennett,
+    bricard,
+    delta,
+    governor,
+    rssr,
+    sarrus,
+    slider_crank,
+    top,
+)
 
 WORLD = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
@@ -260,6 +270,58 @@ def test_bricard_of_the_library_of_benchmarks():
     assert period == pytest.approx(4.991712, abs=1e-6)
 
 
+GOVERNOR = (
+    0.523836,
+    0.585079,
+    0.658632,
+    0.717713,
+    0.743249,
+    0.727631,
+    0.675467,
+    0.603181,
+    0.536282,
+    0.501420,
+)
+"""Height (m) of the slider of IFToMM benchmark A05 at 0.1, 0.2, ... 1.0 s, in six digits: the
+library's reference solution as drawn in the vector graphics of its comparison with OpenSim
+(RehabEngGroup/MBSbenchmarksInOpenSim on GitHub, help/images/5MBS_PlotResults.pdf)."""
+SLIDER = (
+    0.226785384,
+    0.263034975,
+    0.28194126,
+    0.222848664,
+    0.184952803,
+    0.205149298,
+    0.233436939,
+    0.272248997,
+    0.269894777,
+    0.211754668,
+)
+"""Place (m) of the slider of the library's spatial rigid slider-crank mechanism at 0.1, 0.2, ...
+1.0 s, the solution of Gonzalez; FINER: that of Masarati at 0.004 and 0.1 s, from where on it drifts
+by its steps. Both as they were submitted to the library (jgerstmayr/EXUDYN on GitHub,
+docs/verification/Slidercrank3DiftommBenchmark)."""
+FINER = {0.004: 0.2009633, 0.1: 0.2267867}
+
+
+def test_the_flyball_governor_of_the_library_of_benchmarks():
+    found, _ = run(governor(), 4000, 2.5e-4, "passive-midpoint")
+    np.testing.assert_allclose(found["x[3]"][400::400], GOVERNOR, rtol=0, atol=1e-6)
+
+
+def test_the_spatial_slider_crank_of_the_library_of_benchmarks():
+    """The solutions of the library differ by more than these bounds from each other, by the steps
+    that were taken."""
+    found, states = run(slider_crank(), 1000, 1e-3)
+    x = found["x[1]"]
+    np.testing.assert_allclose(x[100::100], SLIDER, rtol=0, atol=5e-5)
+    for time, at in FINER.items():
+        assert x[round(time * 1e3)] == pytest.approx(at, abs=1e-6)
+    slider, *omega = states[0, 6:10] + [0, 6, 0, 0]
+    assert [slider, *omega] == pytest.approx([0.24, 1.92, -0.96, 0.48])
+    assert np.ptp(found["energy"]) < 2e-7
+
+
 @pytest.mark.parametrize(("h", "error"), [(4e-3, 2e-4), (2e-3, 1.3e-5)])
 def test_a_heavy_top_keeps_energy_and_both_momenta(h, error):
     """The energy and the angular momenta about the vertical and about its axis are constants of a
@@ -290,9 +352,17 @@ def test_a_heavy_top_keeps_energy_and_both_momenta(h, error):
 
 
 @pytest.mark.parametrize("axis", [X_AXIS, Y_AXIS, Z_AXIS])
-def test_a_passive_method_makes_no_energy_in_space(axis):
-    """Of a top without weight or of a swinging one, at steps of a tenth of a turn."""
+@pytest.mark.parametrize("free", [False, True])
+def test_a_passive_method_makes_no_energy_in_space(axis, free):
+    """Of a top under gravity along an axis, and of it in flight, where it tumbles about the middle
+    one of three moments of inertia, at steps of a tenth of a turn."""
     linkage = top(gravity=tuple(-9.81 * a for a in axis))
+    if free:
+        thrown = replace(linkage.body[0], inertia=(8e-4, 1.5e-3, 2e-3), center=(0.01, 0.0, 0.02))
+        joint = Joint(name="ball", type="floating", child="top")
+        spin = tuple(40.0 * a for a in (0.1, 1.0, 0.1))
+        rates = {"ball": (0.1, 0.2, 3.0, *spin)}
+        linkage = replace(linkage, body=(thrown,), joint=(joint,), start_velocity=rates)
     found, _ = run(linkage, 200, 0.016, "passive-midpoint")
     assert np.diff(found["energy"]).max() < 1e-12
     assert found["stops"].max() == 0

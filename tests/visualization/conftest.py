@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.visualization.browser_code.served_page import Served
+from tests.visualization.browser_code.served_page import SCENE, Served
 
 if TYPE_CHECKING:
     from tests.visualization.browser_code.chromium import Page
@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 def served(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Served]:
-    """`view` of the scene that the module calls SERVED, by default one with a free direction."""
+    """`view` of the scene that the module calls SERVED, or has the text of as SERVED_TEXT, by
+    default one with a free direction."""
     scene = getattr(request.module, "SERVED", "scene.toml")
-    with Served(tmp_path_factory.mktemp("view"), scene=scene) as page:
+    text = getattr(request.module, "SERVED_TEXT", SCENE)
+    with Served(tmp_path_factory.mktemp("view"), scene=scene, text=text) as page:
         yield page
 
 

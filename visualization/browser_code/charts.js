@@ -1,13 +1,14 @@
 // Strip charts: of the last 10 s of a run that goes on, or of whole runs that are recorded.
 import { FELT, fitted, inTheme, text, themed } from "./canvas.js";
+import { apart, length } from "./view.js";
 
 const SPAN = 10, LEFT = 44, ENERGIES = 4; // s, px, and the most lines of energies
 const COLORS = ["#4477aa", "#b85c00", "#228833", "#aa3377", "#cc3311", "#8250c8", "#75751f", "#882255", "#1f7d70", "#666666"], DASHES = [[], [5, 3], [2, 3], [7, 3, 2, 3]];
-const size = (v) => v && Math.hypot(v[0], v[1]);
-// `each`: series of every user, from that user's part of a frame; `series`: from the whole frame.
+const size = (v, d) => v && length(v, d);
+// `each`: series of every user, from that user's part of a frame and the dimension of the linkage; `series`: from the whole frame.
 const CHARTS = [
-  { title: "tracking error", unit: "mm", each: { error: (u) => u.arms && 1e3 * Math.hypot(u.x[0] - u.handle[0], u.x[1] - u.handle[1]) } },
-  { title: "force", unit: "N", colors: ["#b85c00", "#4477aa", "#aa3377", "#cc3311"], each: { hand: (u) => size(u.F_hand), motors: (u) => size(u.F_motor), "of them topology": (u) => size(u.F_constraint), contacts: (u) => size(u.F_env) } },
+  { title: "tracking error", unit: "mm", each: { error: (u, d) => u.arms && 1e3 * apart(u.x, u.handle, d) } },
+  { title: "force", unit: "N", colors: ["#b85c00", "#4477aa", "#aa3377", "#cc3311"], each: { hand: (u, d) => size(u.F_hand, d), motors: (u, d) => size(u.F_motor, d), "of them topology": (u, d) => size(u.F_constraint, d), contacts: (u, d) => size(u.F_env, d) } },
   { title: "constrained directions", unit: "count", each: { number: (u) => u.n?.[0] } },
   { title: "energy generated since the start", unit: "mJ", energies: true },
   { title: "closure error", unit: "m", series: { gap: (f) => f.closure_error?.[0] }, expert: true },
@@ -20,9 +21,9 @@ export class Charts {
     this.charts = [];
   }
 
-  begin(energies, users, runs = 1) {
+  begin(energies, users, dimension, runs = 1) {
     this.charts = CHARTS.map((chart) => {
-      const series = chart.series ?? ofUsers(chart.each, users);
+      const series = chart.series ?? ofUsers(chart.each, users, dimension);
       return new Chart({ ...chart, series, users: chart.each ? users : [""] }, energies, runs);
     });
     const fold = document.createElement("details"), title = document.createElement("summary");
@@ -45,11 +46,11 @@ export class Charts {
 }
 
 // The series of each user, whose name stands first for further users.
-function ofUsers(each, users) {
+function ofUsers(each, users, dimension) {
   const of = (frame, user) => (user ? frame.others?.[user] : frame);
   const read = (user) => Object.entries(each ?? {}).map(([name, value]) => [
     user ? `${user}: ${name}` : name,
-    (frame) => of(frame, user) && value(of(frame, user)),
+    (frame) => of(frame, user) && value(of(frame, user), dimension),
   ]);
   return Object.fromEntries(users.flatMap(read));
 }

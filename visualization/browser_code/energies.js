@@ -35,14 +35,14 @@ export class Energies {
   }
 
   sum({ booked, stored }) {
-    this.start ??= stored;
-    this.energy = { [this.port]: stored - this.start };
+    const hands = this.power.reduce((sum, { hand }, i) => sum + (hand ? booked[i][0] : 0), 0);
+    this.start ??= stored - hands; // a page that opens later counts from there
+    this.energy = { [this.port]: stored - hands - this.start };
     this.generated = this.put_in = 0;
-    this.power.forEach(({ name, hand, counts }, i) => {
+    this.power.forEach(({ name, counts }, i) => {
       const [held, ideal] = booked[i];
       this.energy[name] = held - ideal;
       this.generated += held - ideal;
-      if (hand) this.energy[this.port] -= held;
       if (counts) this.put_in += Math.max(ideal, 0);
     });
   }

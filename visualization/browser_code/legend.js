@@ -1,5 +1,5 @@
 // The legend of a drawing, with the newest forces, and labels of the current states.
-import { place, reach } from "./painter.js";
+import { place, reach, vectorOf } from "./painter.js";
 import { inTheme, text } from "./canvas.js";
 
 export class Legend {
@@ -21,7 +21,7 @@ export class Legend {
   draw(frame) {
     for (const { marks, value } of this.entries.values()) {
       if (marks[0].kind !== "arrow") continue;
-      const sizes = marks.map((mark) => reach(frame, mark.vector)).map((f) => (f ? Math.hypot(f[0], f[1]) : 0));
+      const sizes = marks.map((mark) => vectorOf(mark, frame)).map((force) => (force ? Math.hypot(...force) : 0));
       value.textContent = text(Math.max(...sizes), "N");
     }
   }

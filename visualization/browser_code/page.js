@@ -36,20 +36,22 @@ let address = "", later = null;
 function change(message) { run.send(acts_on_b ? { ...message, b: true } : message); }
 
 const HANDLERS = {
-  opening({ title, marks, shapes, kinds, frame }) {
+  opening({ title, marks, shapes, kinds, view: seen, frame }) {
     document.title = $("title").textContent = title;
     if (!frame) return;
-    stage.begin(marks, shapes);
+    stage.begin(marks, shapes, seen);
     view.kinds = kinds;
     view.start = frame;
   },
   scene(message) {
     document.title = $("title").textContent = message.title;
-    stage.begin(message.marks, message.shapes);
+    stage.begin(message.marks, message.shapes, message.view);
+    $("anywhere").hidden = stage.view.inSpace;
+    $("space").hidden = !stage.view.inSpace;
     view.kinds = message.kinds;
     const runs = message.runs ?? 1;
     energies = Array.from({ length: runs }, () => new Energies(message));
-    charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, runs);
+    charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, stage.view.dimension, runs);
     ending.begin();
     view.start = view.frame = null;
     view.levels = [];
@@ -97,7 +99,7 @@ const HANDLERS = {
     });
     const lights = [message.light, message.b?.light];
     if (message.light) show({ energy: LIGHTS.findLast((light) => lights.includes(light)) });
-    if (sound?.signal) sound.feel(loudness(sound.signal, message));
+    if (sound?.signal) sound.feel(loudness(sound.signal, message, stage.view.dimension));
   },
   map: (message) => show({ map: { ...message, since: performance.now() } }),
   building({ said, took }) { view.building = { said, took, since: performance.now() }; },
@@ -122,7 +124,7 @@ function show(change) {
 }
 
 // What is seen of the handle of the run on which the controls act.
-function watch() { first_minute.add(view.frame.t, (acts_on_b && view.frame.b) || view.frame, view.state.ended); }
+function watch() { first_minute.add(view.frame.t, (acts_on_b && view.frame.b) || view.frame, view.state.ended, stage.view.dimension); }
 
 // For how long something has been waited for.
 function waited(since) {
@@ -198,6 +200,7 @@ function note_address() {
 }
 window.addEventListener("hashchange", () => { if (location.hash.slice(1) !== address) follow(); });
 
+const TURN = 0.1; // rad, by which a key turns the view
 const PULLS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const act = (what) => run.send({ type: "time", do: what });
 $("pause").onclick = () => act(view.state.paused ? "resume" : "pause");
@@ -219,7 +222,13 @@ document.addEventListener("click", () => ending.hide(), true);
 document.addEventListener("keydown", (event) => {
   if (!event.repeat) ending.hide();
   if (event.target.closest("input, select, button, summary")) return;
-  if (event.key in PULLS) { event.preventDefault(); stage.pullBy(PULLS[event.key]); return; }
+  if (event.key in PULLS) {
+    event.preventDefault();
+    const [right, up] = PULLS[event.key];
+    if (event.shiftKey && stage.view?.inSpace) stage.turn(-TURN * right, -TURN * up);
+    else stage.pullBy([right, up]);
+    return;
+  }
   if (event.key === "+" || event.key === "-") stage.zoom(event.key === "+" ? 0.8 : 1.25);
   const button = { " ": "pause", ".": "step", r: "reset" }[event.key];
   if (event.key === "f") stage.refit();

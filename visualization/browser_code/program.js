@@ -2,6 +2,7 @@
 
 import { loudness } from "./loudness.js";
 
+export const SPEED = "speed";
 const RATE = "graphics.rate", RENDERED = "controller.topology", POINT = "linkage.operational_point";
 // The key of what is set at once: a rate with its jitter, a hold with its delay.
 const together = (key) => (key === "jitter" ? RATE : key.replace(/^delays\./, "holds."));
@@ -62,6 +63,7 @@ export class Program {
   // Carries out what is set of a control.
   act(key) {
     const [kind] = key.split("."), name = key.slice(kind.length + 1);
+    if (key === SPEED) return; // the worker's
     if (key === RATE) this.rate();
     else if (kind === "holds") this.hold(name);
     else if (key === POINT) this.point();
@@ -109,7 +111,7 @@ export class Program {
   // A pointer pulls a user's handle to a place, null where it lets go.
   pull(user, at) {
     const hand = this.data.hands[user];
-    if (at) this.set(hand.target, [...at, 0]);
+    if (at) this.set(hand.target, [...at, 0].slice(0, 3)); // in the plane with its angle
     if (Boolean(at) === Boolean(this.pulling.get(user))) return;
     this.pulling.set(user, Boolean(at));
     if (at) this.gain(hand.stiffness);
@@ -146,7 +148,7 @@ export class Program {
     const values = this.numbers(this.c.signal_values(this.m), this.data.n_values);
     this.places ??= Object.fromEntries(this.data.signals.filter(({ user }) => !user).map(({ name, places }) => [name, places]));
     const of = (name) => this.places[name].map((place) => values[place]);
-    return loudness(signal, { F_hand: of("F_hand"), x: of("x"), handle: of("handle") });
+    return loudness(signal, { F_hand: of("F_hand"), x: of("x"), handle: of("handle") }, this.data.scene.view.dimension);
   }
 
   // Time and all outputs at the newest haptic event.

@@ -1,5 +1,5 @@
 // A replay of one or two recorded runs: time, pictures, charts and episodes.
-import { SECOND } from "./canvas.js";
+import { SECOND, SPEEDS } from "./canvas.js";
 import { Charts } from "./charts.js";
 import { tags } from "./legend.js";
 import { Lanes } from "./lanes.js";
@@ -7,7 +7,6 @@ import { Recording } from "./recording.js";
 import { Stage } from "./stage.js";
 
 const $ = (id) => document.getElementById(id);
-const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 const data = JSON.parse($("data").textContent);
 const recordings = data.runs.map((run) => new Recording(run));
 const end = Math.max(...recordings.map((r) => r.end), 1e-9);
@@ -29,15 +28,15 @@ function View(recording) {
   $("stages").append(section);
   this.section = section;
   this.stage = new Stage(canvas, legend);
-  this.stage.begin(recording.marks, data.shapes);
+  this.stage.begin(recording.marks, data.shapes, recording.view);
 }
 
-// One window on the plane for all frames of all runs, so that pictures can be compared.
-function bounds() {
+// One window for all frames of all runs, as a stage sees them, so that pictures can be compared.
+function bounds({ view: seen }) {
   const found = [];
   recordings.forEach((recording, k) => {
     const every = Math.max(1, Math.floor(recording.times.length / 60));
-    for (let i = 0; i < recording.times.length; i += every) found.push(views[k].stage.frameLimits(recording.frame(i), 0.12));
+    for (let i = 0; i < recording.times.length; i += every) found.push(views[k].stage.frameLimits(recording.frame(i), 0.12, seen));
   });
   return [0, 1].map((axis) => [Math.min(...found.map((l) => l[axis][0])), Math.max(...found.map((l) => l[axis][1]))]);
 }
@@ -106,12 +105,11 @@ function begin() {
   document.title = $("title").textContent = [...new Set(recordings.map((r) => r.title))].join(" and ");
   $("slider").max = end;
   $("speed").append(...SPEEDS.map((s) => new Option(`${s}×`, s, s === 1, s === 1)));
-  charts.begin(recordings[0].energies.map((name) => ({ name, words: name })), recordings[0].users, recordings.length);
+  charts.begin(recordings[0].energies.map((name) => ({ name, words: name })), recordings[0].users, views[0].stage.view.dimension, recordings.length);
   recordings.forEach((recording, k) => {
     for (let i = 0; i < recording.times.length; i++) charts.add(recording.frame(i), k, Infinity);
   });
-  const fixed = bounds();
-  for (const { stage } of views) stage.bounds = fixed;
+  for (const { stage } of views) stage.bounds = () => bounds(stage);
   $("layout").hidden = recordings.length < 2;
   $("note").textContent = recordings.flatMap((r) => [
     r.missing.length ? `${r.short}: not recorded, and so not shown: ${r.missing.join(", ")}.` : "",
@@ -132,7 +130,7 @@ charts.host.addEventListener("pointerdown", (event) => {
   if (at !== null) { pause(); seek(at); }
 });
 window.addEventListener("resize", () => { view.changed = true; });
-$("stages").addEventListener("wheel", () => { view.changed = true; });
+for (const moved of ["wheel", "pointermove"]) $("stages").addEventListener(moved, () => { view.changed = true; });
 document.addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.metaKey || event.altKey || event.target.closest("select")) return;
   const many = event.shiftKey ? 10 : 1;

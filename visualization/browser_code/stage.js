@@ -3,11 +3,14 @@
 import { fitted, inTheme, themed } from "./canvas.js";
 import { Legend } from "./legend.js";
 import { paint, place, zigzag } from "./painter.js";
+import { View } from "./view.js";
 
 const HAND = "#b85c00";
 const SEND_INTERVAL = 8; // ms, the least between two targets that are sent; frames are slower
 const KEYS = "keys", STEP = 0.004; // who pulls where keys do, and how far each time (m)
 const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
+const GRASP = 40, TURN = 0.01; // px from a handle in space that still take hold of it; rad to a px beside it
+const AXES = [44, 68, 24]; // px from the left, px from below, and length of the world's axes
 
 export class Stage {
   constructor(canvas, legend, pull) {
@@ -15,7 +18,7 @@ export class Stage {
     this.legend = new Legend(legend);
     this.pulls = new Map(); // by pointer: the user, the target, when it was sent, the next timer
     this.limits = null;
-    this.bounds = null; // the part of the plane to show, in place of what the first frame has
+    this.bounds = null; // gives the part of the picture to show, in place of what the first frame has
     const pointAt = (event) => {
       const box = canvas.getBoundingClientRect();
       return this.toWorld(event.clientX - box.left, event.clientY - box.top);
@@ -29,6 +32,7 @@ export class Stage {
     };
     const release = ({ pointerId }) => {
       if (pointerId === this.panning) this.panning = null;
+      if (pointerId === this.turning) this.turning = null;
       const pulling = this.pulls.get(pointerId);
       if (!pulling) return;
       clearTimeout(pulling.later);
@@ -44,12 +48,14 @@ export class Stage {
       canvas.setPointerCapture(event.pointerId);
       this.panning = event.pointerId;
     });
-    if (pull) canvas.addEventListener("pointerdown", (event) => {
+    canvas.addEventListener("pointerdown", (event) => {
       if (!this.limits || event.button || event.shiftKey) return;
-      const target = pointAt(event), user = this.nearest(target);
-      if (user === undefined) return;
+      const at = pointAt(event), user = pull && this.nearest(at);
+      if (user === undefined && !this.view.inSpace) return;
       canvas.setPointerCapture(event.pointerId);
-      const pulling = { user, target };
+      if (user === undefined) { this.turning = event.pointerId; return; }
+      const { handle } = users(this.frame).find(([name]) => name === user)[1], depth = this.view.project(handle)[2];
+      const pulling = { user, depth, target: this.target(at, depth) };
       this.pulls.set(event.pointerId, pulling);
       canvas.classList.add("held");
       sendTarget(pulling);
@@ -57,11 +63,13 @@ export class Stage {
     canvas.addEventListener("pointermove", (event) => {
       if (event.pointerId === this.panning) {
         const by = [-event.movementX / this.scale, event.movementY / this.scale];
+        this.follows = false;
         this.limits = this.limits.map((axis, i) => axis.map((v) => v + by[i]));
       }
+      if (event.pointerId === this.turning) this.turn(-TURN * event.movementX, TURN * event.movementY);
       const pulling = this.pulls.get(event.pointerId);
       if (!pulling) return;
-      pulling.target = pointAt(event);
+      pulling.target = this.target(pointAt(event), pulling.depth);
       if (pulling.later) return; // the timer sends the newest target, also where the mouse has stopped
       const wait = pulling.sent + SEND_INTERVAL - performance.now();
       if (wait > 0) pulling.later = setTimeout(sendTarget, wait, pulling);
@@ -76,44 +84,76 @@ export class Stage {
   }
 
   // A run that begins anew is pulled on by what is still pressed.
-  begin(marks, shapes) {
+  begin(marks, shapes, view) {
     this.marks = marks;
     this.shapes = shapes;
-    this.limits = this.frame = null;
+    if (JSON.stringify(view) !== this.given) this.view = new View(view); // one that was turned stays
+    this.given = JSON.stringify(view);
+    this.refit();
+    this.frame = null;
     this.pulls.forEach(this.sendTarget);
   }
 
-  refit() { this.limits = null; }
+  refit() {
+    this.limits = null;
+    this.follows = true; // what moves out of the picture, until that is moved or zoomed
+  }
+
+  // Widens a picture in space so that it has all bodies, which gravity takes farther there than a start lets expect.
+  follow(frame) {
+    const now = this.frameLimits(frame, 0.05);
+    this.limits = this.limits.map(([low, high], i) => [Math.min(low, now[i][0]), Math.max(high, now[i][1])]);
+  }
 
   // Scales what is shown about a place, by default the middle.
   zoom(factor, about = this.limits?.map(([a, b]) => (a + b) / 2)) {
+    this.follows = false;
     this.limits = this.limits?.map((axis, i) => axis.map((v) => about[i] + factor * (v - about[i])));
   }
+
+  // Turns a picture in space about the middle of its bodies.
+  turn(about, down) {
+    if (!this.view.inSpace || !this.limits) return;
+    const ends = this.marks.filter(({ role }) => role === "body").flatMap(({ at }) => at.map((each) => place(this.frame, each)));
+    const middle = [0, 1, 2].map((i) => ends.reduce((sum, end) => sum + end[i] / ends.length, 0)), before = this.view.project(middle);
+    this.view.turn(about, down);
+    const by = this.view.project(middle).map((v, i) => v - before[i]);
+    this.limits = this.limits.map((axis, i) => axis.map((v) => v + by[i]));
+  }
+
+  // Where a pointer at a place of the picture pulls to: as near to the eye as the handle was.
+  target(at, depth) { return this.view.back([at[0], at[1], depth]); }
 
   // A key pulls the first user's handle further in a direction, until all are let go.
   pullBy([dx, dy]) {
     if (!this.limits || !this.frame?.handle) return;
-    const pulling = this.pulls.get(KEYS) ?? { user: "", target: this.frame.handle.slice(0, 2) };
-    pulling.target = [pulling.target[0] + STEP * dx, pulling.target[1] + STEP * dy];
+    const pulling = this.pulls.get(KEYS) ?? { user: "", target: this.frame.handle.slice(0, this.view.dimension) };
+    const by = this.view.back([STEP * dx, STEP * dy]);
+    pulling.target = pulling.target.map((v, i) => v + by[i]);
     this.pulls.set(KEYS, pulling);
     this.sendTarget(pulling);
   }
 
   letGo() { this.release({ pointerId: KEYS }); }
 
-  // The user whose handle is nearest to a place, of those that no pointer here pulls.
+  // The user whose handle is nearest to a place of the picture, of those that no pointer here pulls; none where that is far
+  // away in space.
   nearest([x, y]) {
     const pulled = [...this.pulls.values()].map((pulling) => pulling.user);
     const free = users(this.frame).filter(([name, { handle }]) => handle && !pulled.includes(name));
-    const distance = ([, { handle }]) => Math.hypot(handle[0] - x, handle[1] - y);
-    return free.sort((a, b) => distance(a) - distance(b))[0]?.[0];
+    const distance = ([, { handle }]) => {
+      const [right, up] = this.view.project(handle);
+      return Math.hypot(right - x, up - y);
+    };
+    const [first] = free.sort((a, b) => distance(a) - distance(b));
+    return first && (!this.view.inSpace || distance(first) * this.scale < GRASP) ? first[0] : undefined;
   }
 
-  // The part of the plane that is shown (m): all that the first frame has, with a margin.
-  frameLimits(frame, open = 0.45) {
+  // The part of the picture that is shown (m): all that the first frame has, with a margin.
+  frameLimits(frame, open = 0.45, view = this.view) {
     const fitted = this.marks.filter((mark) => FITTED.includes(mark.role)), points = [];
     for (const mark of fitted) {
-      for (const [x, y] of mark.at.map((each) => place(frame, each)).filter(Boolean)) {
+      for (const [x, y] of mark.at.map((each) => place(frame, each)).filter(Boolean).map((each) => view.project(each))) {
         points.push([x - mark.size, y - mark.size], [x + mark.size, y + mark.size]);
       }
     }
@@ -130,7 +170,11 @@ export class Stage {
     this.origin = [width / 2 - (this.scale * (x0 + x1)) / 2, height / 2 + (this.scale * (y0 + y1)) / 2];
   }
 
-  toScreen = ([x, y]) => [this.origin[0] + this.scale * x, this.origin[1] - this.scale * y];
+  toScreen = (place) => {
+    const [x, y] = this.view.project(place);
+    return [this.origin[0] + this.scale * x, this.origin[1] - this.scale * y];
+  };
+  // The place of the picture (m, to the right and up) at a pixel.
   toWorld = (px, py) => [(px - this.origin[0]) / this.scale, (this.origin[1] - py) / this.scale];
 
   // `others` are runs in the same picture: marks, frame and color of each.
@@ -138,7 +182,8 @@ export class Stage {
     const { context, width, height } = fitted(this.canvas);
     if (!this.frame) this.legend.begin(this.marks, frame, this.shapes);
     this.frame = frame;
-    this.limits ??= this.bounds ?? this.frameLimits(frame);
+    this.limits ??= this.bounds?.() ?? this.frameLimits(frame);
+    if (this.view.inSpace && this.follows && !this.pulls.size) this.follow(frame);
     this.fit(width, height);
     paint(context, this.marks, frame, this);
     for (const other of others) paint(context, outlined(other), other.frame, this);
@@ -146,6 +191,7 @@ export class Stage {
     for (const [name, user] of users(frame)) this.drawPull(context, user, name);
     this.legend.draw(frame);
     this.drawScale(context, height);
+    if (this.view.inSpace) this.drawAxes(context, height);
   }
 
   // Where a vibrating handle was in the last second.
@@ -170,6 +216,22 @@ export class Stage {
     context.beginPath();
     context.arc(...target, 4, 0, 7);
     context.fill();
+  }
+
+  // The directions x, y and z of the world.
+  drawAxes(context, height) {
+    const [left, below, size] = AXES, from = [left, height - below];
+    context.strokeStyle = context.fillStyle = themed("soft");
+    context.lineWidth = 1.5;
+    context.font = "12px system-ui, sans-serif";
+    "xyz".split("").forEach((name, i) => {
+      const [right, up] = this.view.project([0, 1, 2].map((k) => size * (k === i))), to = [from[0] + right, from[1] - up];
+      context.beginPath();
+      context.moveTo(...from);
+      context.lineTo(...to);
+      context.stroke();
+      context.fillText(name, to[0] + right / 4 - 3, to[1] - up / 4 + 4);
+    });
   }
 
   drawScale(context, height) {

@@ -1,4 +1,4 @@
-// How often in the last second a point swung to and fro: it turns where, along x or y, it has come back by LEAST.
+// How often in the last second a point swung to and fro: it turns where, along x, y or z, it has come back by LEAST.
 const WINDOW = 1; // s
 const LEAST = 1e-3; // m
 const OFTEN = 6; // turns in it, two to each time to and fro, from which on it vibrates; who drags does not turn as often
@@ -26,9 +26,9 @@ export class Swings {
   constructor() { this.axes = []; }
 
   // A run that begins anew is another one.
-  add(t, point) {
+  add(t, point, dimension) {
     if (!this.axes.length || t < this.t) {
-      this.axes = [0, 1].map((i) => new Axis(point[i]));
+      this.axes = point.slice(0, dimension).map((at) => new Axis(at));
       this.since = t;
       this.past = [];
     }
@@ -44,7 +44,7 @@ export class Swings {
   // Whether it has been seen for that long.
   get watched() { return this.t - this.since >= WINDOW; }
 
-  // How many `times` to and fro along that of x and y which has more, and by how much on average (`mm`); null where too few.
+  // How many `times` to and fro along that of x, y and z which has more, and by how much on average (`mm`); null where too few.
   get vibration() {
     const [{ turns }] = this.axes.toSorted((a, b) => b.turns.length - a.turns.length);
     if (turns.length < OFTEN) return null;

@@ -38,7 +38,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import Results, Table, Vector, with_record
+from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
@@ -53,7 +53,9 @@ from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures.curves import curve, port_curve
 from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
-from hapticlink.visualization.mechanism import drawing, marks, space_drawing
+from hapticlink.visualization.mechanism import drawing, marks
+from hapticlink.visualization.mechanism.mark_places import MM, on_page
+from hapticlink.visualization.mechanism.view import PLANE_VIEW, View, view_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -92,18 +94,14 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     # an SSP has the block, but not its description
     linkage, devices = scene_part(results, "linkage", Linkage), described_devices(results)
     size, port = len(linkage.coordinate_units) if linkage else 0, whole and port_curve(whole)
-    planar = linkage and linkage.dimension == 2
-    if linkage and planar and (table := of_block(results, JOINT_COORDINATES, size)):
-        q = table[JOINT_COORDINATES]
-        finite = np.flatnonzero(np.isfinite(q).all(axis=1))
-        if len(finite) and of_port(results, POINT_POSE):
-            ends = q[finite[[0, -1]]]
-            drawn_by["mechanism"] = partial(_mechanism, results, linkage, ends, port)
     if of_port(results, POINT_POSE):
-        if linkage and not planar:
+        table = of_block(results, JOINT_COORDINATES, size) if linkage else None
+        q = table[JOINT_COORDINATES] if table else np.zeros((0, 1))
+        finite = np.flatnonzero(np.isfinite(q).all(axis=1))
+        if linkage and len(finite):
+            drawn_by["mechanism"] = partial(_mechanism, results, linkage, q[finite[[0, -1]]], port)
+        if linkage and linkage.dimension > 2:
             drawn_by["trajectories"] = partial(_places_in_time, results, linkage)
-            if table := of_block(results, JOINT_COORDINATES, size):
-                drawn_by["mechanism"] = partial(_in_space, results, linkage, table)
         elif "mechanism" not in drawn_by:
             drawn_by["trajectories"] = partial(_trajectories, results)
         if of_port(results, find_handle(results)):
@@ -131,7 +129,7 @@ def files(results: Results, formats: Sequence[str]) -> Iterator[tuple[str, bytes
 
 def _mechanism(results: Results, linkage: Linkage, q: Vector, port: UserPort | None) -> Figure:
     marked = episodes(results)
-    figure, axes = titled_axes(results, _finding(results, marked, port), "x (mm)", "y (mm)")
+    figure, axes = titled_axes(results, _finding(results, marked, port), "", "")
     contacts, devices = scene_part(results, "contacts", Contacts), described_devices(results)
     starts: list[Vector] = []
     ends: list[Vector] = []
@@ -194,9 +192,10 @@ def _arrow(results: Results, axes: Axes) -> None:
     size, time, force, pose = largest
     _, color, where = marks.FORCES["F_hand"]
     label = in_lines(f"largest force of the hand, {short(size)} N, at {time:.3g} s", 34)
-    place = (marks.Place((where,)),)
+    place = (marks.Place((where,), (0.0,) * len(pose)),)
     arrow = marks.arrow("force", place, color, label, ("F_hand",))._replace(size=ARROW / size)
-    drawing.paint(axes, [arrow], {where: pose, "F_hand": force.tolist()}, zorder=6)
+    frame = {where: pose.tolist(), "F_hand": force.tolist()}
+    drawing.paint(axes, [arrow], frame, zorder=6, view=_view(results))
 
 
 def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
@@ -205,12 +204,13 @@ def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     handle = handle or of_port(results, POINT_POSE)
     if not (force and handle):
         return None
-    F, times = force[HAND_WRENCH][:, :2], force["time"]
-    most = np.hypot(*F.T)
+    view = _view(results)
+    F, times = force[HAND_WRENCH][:, : view.dimension], force["time"]
+    most = np.hypot.reduce(F, axis=1)
     k = int(most.argmax())
     row = int(np.searchsorted(handle["time"], times[k] + 1e-12, "right")) - 1
-    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0), :2]
-    return most[k], times[k], F[k], pose
+    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0)]
+    return most[k], times[k], F[k], pose[: view.dimension]
 
 
 def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
@@ -218,6 +218,7 @@ def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
     if of_port(results, POINT_POSE) is None:
         return
     time, path = curve(*_place(results, POINT_POSE))
+    path = on_page(path, _view(results))
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
         spans = [(e.begin - 1e-12, e.end + 1e-12) for e in marked if e.kind == kind]
@@ -230,21 +231,28 @@ def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
 
 
 def _place(results: Results, signal: str) -> tuple[Vector, Vector]:
-    """Times (s) and places (mm) of a pose."""
+    """Times (s) and places (mm) of a pose, (k, 2), in space (k, 3)."""
     table = of_port(results, signal)
     assert table is not None
-    return table["time"], table[signal][:, :2] * 1e3
+    return table["time"], table[signal][:, : _view(results).dimension] * MM
+
+
+def _view(results: Results) -> View:
+    """How the linkage of a run is seen."""
+    linkage = scene_part(results, "linkage", Linkage)
+    return view_of(linkage) if linkage else PLANE_VIEW
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
-    """Label, line style and path (mm) of operational point, handle and further points."""
+    """Label, line style and path (mm, on the page) of operational point, handle and further
+    points."""
     linkage = results.record.scene["linkage"] or {}
     further = [
         (signal_of_user(POINT_POSE, point["name"]), f"point {point['name']}", "-.")
         for point in linkage.get("point", ())
     ]
     return [
-        (label, style, curve(*_place(results, signal))[1])
+        (label, style, on_page(curve(*_place(results, signal))[1], _view(results)))
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
             (find_handle(results), "handle x_D", "--"),
@@ -272,32 +280,11 @@ def _trajectories(results: Results) -> Figure:
     return figure
 
 
-def _in_space(results: Results, linkage: Linkage, table: Table) -> Figure:
-    """The linkage at the start and the end of the run, and the path of its operational point."""
-    (_, path), q = _path(results), table[JOINT_COORDINATES]
-    figure, axes = titled_axes(results, _reach_in_space(path), "", "")
-    finite = np.flatnonzero(np.isfinite(q).all(axis=1))
-    space_drawing.draw(axes, linkage, q[finite[0]], q[finite[-1]], path)
-    return figure
-
-
-def _path(results: Results) -> tuple[Vector, Vector]:
-    """Times (s) and places (m) of the operational point in space."""
-    table = of_port(results, POINT_POSE)
-    assert table is not None
-    return table["time"], table[POINT_POSE]
-
-
-def _reach_in_space(path: Vector) -> str:
-    reach = short(1e3 * float(np.linalg.norm(path - path[0], axis=1).max(initial=0.0)))
-    return f"The operational point moves up to {reach} mm from its start"
-
-
 def _places_in_time(results: Results, linkage: Linkage) -> Figure:
     """The operational point in space over time."""
-    times, path = _path(results)
-    figure, axes = titled_axes(results, _reach_in_space(path), "time (s)", "place (mm)")
-    time, drawn = curve(times, 1e3 * path)
+    title = f"The operational point moves up to {short(_reach(results))} mm from its start"
+    figure, axes = titled_axes(results, title, "time (s)", "place (mm)")
+    time, drawn = curve(*_place(results, POINT_POSE))
     for name, column, style in zip(linkage.space.names, drawn.T, cycle(STYLES)):
         axes.plot(time, column, style, label=name)
     axes.legend(fontsize="small")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -28,11 +29,12 @@ def open_page(title: str, *drawing: Any) -> dict[str, Any]:
 
 
 def describe_picture(picture: Picture) -> dict[str, Any]:
-    """`marks` and the `shapes` that they name, what states mean (`kinds`), the name of the user's
-    `port`, and the `noticeable` energy (J)."""
+    """`marks` and the `shapes` that they name, the `view` with which they are seen, what states
+    mean (`kinds`), the name of the user's `port`, and the `noticeable` energy (J)."""
     return {
         "marks": [mark._asdict() for mark in picture.marks],
         "shapes": SHAPES,
+        "view": asdict(picture.view),
         "kinds": KINDS,
         "port": PORT,
         "noticeable": NOTICEABLE_J,

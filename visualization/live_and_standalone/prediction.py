@@ -11,7 +11,7 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
 from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
-from hapticlink.analysis.stability.hands import HANDS
+from hapticlink.analysis.stability.hands import hands_in
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.resting_scene import resting_system
@@ -27,7 +27,7 @@ from hapticlink.orchestrator.system.changes import with_hold
 from hapticlink.orchestrator.system.system import Fmu, System
 from hapticlink.orchestrator.system.timeline import timeline
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
-from hapticlink.visualization.live_and_standalone.viewed_scene import DAMPING, STIFFNESS
+from hapticlink.visualization.live_and_standalone.viewed_scene import mouse
 
 MAX_COST = {"native": 2e8, "python": 1e7}
 """Haptic ticks of a hyperperiod times the square of the numbers of the state, up to which the map
@@ -89,7 +89,7 @@ def judge_hands(
     words. Raises InputFault where its computation would take long, and as `stability` does."""
     if settings.get(JITTER):
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
-    if scene.hand is None:
+    if scene.hand is None or scene.linkage is None:
         raise InputFault("nobody holds the mechanism")
     changed = _at_rate(scene, settings.get(RATE))
     with (
@@ -108,7 +108,9 @@ def judge_hands(
                 for c in whole.connections
             ),
         )
-        hands = {MOUSE: SpringHand(stiffness=STIFFNESS, damping=DAMPING), **HANDS}
+        stiffness, damping = mouse(scene.linkage)
+        pulled = SpringHand(stiffness=stiffness, damping=damping)
+        hands = {MOUSE: pulled, **hands_in(scene.space)}
         without, _ = frozen_nonlinearities.without(system)
         calming = {c.hold for c in system.connections if has_friction(c)}
         beside = "".join(f", without the friction of hold {hold}" for hold in calming)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 
 from hapticlink.components import registry
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import InputFault
@@ -12,10 +13,11 @@ from hapticlink.orchestrator.base.signal_names import HAND, block_of_user
 from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.visualization.mechanism.picture import require_planar
 
-STIFFNESS, DAMPING = (100.0, 100.0, 0.0), (5.0, 5.0, 0.005)
-"""Of the mouse's spring and damper to the handle, which leave its turn free but damped."""
+Three = tuple[float, float, float]
+STIFFNESS, DAMPING = (100.0, 0.0), (5.0, 0.005)
+"""Of the mouse's spring and damper to the handle along and about axes: they leave its turn free but
+damped."""
 DURATION = 600.0
 """s after which a page begins anew, which bounds what a run keeps on the disk."""
 
@@ -23,15 +25,14 @@ DURATION = 600.0
 def load_viewed_scene(name: str, options: Options = (), duration: float = DURATION) -> Scene:
     """The scene with a spring hand for each user without a board that pulls nowhere yet, of
     compiled FMUs if the options say nothing else, and without its end at the border of the
-    workspace. Raises InputFault for a scene without a linkage in the plane, or one that has an FMU
-    of the user's in place of a hand."""
+    workspace. Raises InputFault for a scene without a linkage, or one that has an FMU of the user's
+    in place of a hand."""
     linkage = open_scene.load(name, options).linkage
     if linkage is None:
         raise InputFault(
             f"{name}: has no [linkage], so that there is nothing to take hold of; view shows "
             "mechanisms, for instance `hapticlink view closed-loop`"
         )
-    require_planar(linkage, name)
     read = open_scene.load(name, (*write_options({"packaging": "native"}), *write_options(options)))
     hands = [block_of_user(HAND, user) for user in ("", *read.devices)]
     if any(fmu.replaces in hands for fmu in read.fmu):
@@ -41,7 +42,7 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
     hand = {
         "type": "spring",
         "stiffness": [0.0, 0.0, 0.0],
-        "damping": DAMPING,
+        "damping": mouse(linkage)[1],
         "target": [[0.0, 0.0, 0.0, 0.0]],
     }
     record = {"signals": "all"}  # what is not recorded is not read from its FMU
@@ -51,6 +52,12 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
     if read.stop_when is None and read.ends_when:
         changes["stop_when"] = ""
     return open_scene.load(read, changes)
+
+
+def mouse(linkage: Linkage) -> tuple[Three, Three]:
+    """Stiffness and damping of the mouse's spring, an entry for each direction of the handle."""
+    x, y, z = linkage.space.turns
+    return (STIFFNESS[x], STIFFNESS[y], STIFFNESS[z]), (DAMPING[x], DAMPING[y], DAMPING[z])
 
 
 def simulated(scene: Scene) -> Scene:

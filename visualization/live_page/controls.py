@@ -18,6 +18,7 @@ from hapticlink.visualization.live_and_standalone.offered_controls import (
     MODEL,
     RATE,
     RENDERED,
+    SPEED,
     Offered,
     Settings,
     stiffness,
@@ -76,6 +77,8 @@ class Controls:
             return  # a run begins with it
         if key == RATE:
             self._change_rate()
+        elif key == SPEED:
+            self._live.speed = self._settings[key]
         elif key == OPERATIONAL_POINT:
             self._live.set(key, self._settings[key])
         elif kind == "holds":
@@ -115,12 +118,15 @@ class Controls:
             raise InputFault("the rate varies in this scene: set the rate first")
         self._live.rate(CLOCK, own if rate is None and jitter else rate, jitter)
 
-    def _pull(self, user: str, at: tuple[float, float] | None) -> None:
+    def _pull(self, user: str, at: tuple[float, ...] | None) -> None:
         _require(user, self._pulling)
+        linkage = self._live.scene.linkage
+        if at is not None and linkage and len(at) != linkage.dimension:
+            raise InputFault(f"at: this hand is pulled to a place of {linkage.dimension} numbers")
         if driver_of(self._live.scene, user):  # which somebody's own hand moves
             return
         if at is not None:
-            self._live.set(target(user), (*at, 0.0))
+            self._live.set(target(user), (*at, 0.0)[:3])  # in the plane with its angle
         pulling = at is not None
         if pulling != self._pulling[user]:
             self._pulling[user] = pulling

@@ -29,8 +29,9 @@ class Hand:
 
     __pydantic_config__ = STRICT
     type: Literal["hand"]
-    at: tuple[Coordinate, Coordinate] | None
-    """Where it pulls to, (x, y) in m; None where it releases the handle."""
+    at: tuple[Coordinate, Coordinate] | tuple[Coordinate, Coordinate, Coordinate] | None
+    """Where it pulls to, (x, y) in m, of a linkage in space (x, y, z); None where it releases the
+    handle."""
     user: Name = ""
     """The point whose handle it is, "" for that of the first user."""
 

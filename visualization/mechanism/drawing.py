@@ -3,8 +3,8 @@ writes the names of bodies and joints beside them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,19 +15,19 @@ from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.visualization.figure_axes import headline, plain
 from hapticlink.visualization.mechanism import mark_places, workspace_drawing
-from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, place
+from hapticlink.visualization.mechanism.mark_places import MM, Frame, Points, on_page, place
 from hapticlink.visualization.mechanism.marks import (
     BODIES,
-    ORIGIN,
     Mark,
     Place,
     Point,
     attachment_points,
+    full,
     outline,
     outline_bodies,
-    reach,
 )
 from hapticlink.visualization.mechanism.picture import Picture
+from hapticlink.visualization.mechanism.view import PLANE_VIEW, View
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,6 +42,8 @@ MAX_NAMED_BODIES = 10
 """Bodies of a linkage of which the names are written beside them."""
 ROLES_BEHIND_PATHS = ("obstacle", "device", "directions", "ground", "rail", "spring")
 """Roles of marks that are drawn behind paths."""
+CORNER, TRIAD = (0.08, 0.12), 34.0
+"""Where the world's directions are drawn (parts of the drawing), and their length (pt)."""
 
 
 def draw(
@@ -58,20 +60,30 @@ def draw(
     frame = picture.at_rest(q)
     if end is not None:
         at_end = {"end": picture.drawn({"q": end})["poses"]}
-        paint(
-            axes,
-            outline_bodies(linkage, "end", "#8c8c8c", "the linkage at the end"),
-            at_end,
-            zorder=2,
-        )
-    paint(axes, picture.marks, frame)
-    _names(axes, linkage, frame)
+        outlines = outline_bodies(linkage, "end", "#8c8c8c", "the linkage at the end")
+        paint(axes, outlines, at_end, zorder=2, view=picture.view)
+    paint(axes, picture.marks, frame, view=picture.view)
+    _names(axes, linkage, frame, picture.view)
     limits = _limits(axes)
     if held:
         workspace_drawing.beneath(axes, held, limits)
-    axes.set(xlabel="x (mm)", ylabel="y (mm)", xlim=limits[0], ylim=limits[1])
+    if linkage.dimension > 2:
+        _world_axes(axes, picture.view)
+    else:
+        axes.set(xlabel="x (mm)", ylabel="y (mm)")
+    axes.set(xlim=limits[0], ylim=limits[1])
     axes.set_aspect("equal", adjustable="box")
     return limits
+
+
+def _world_axes(axes: Axes, view: View) -> None:
+    """The directions x, y and z in a corner, in place of the ticks."""
+    for name, along in zip("xyz", on_page(np.eye(3), view), strict=True):
+        axes.annotate(
+            name, CORNER, TRIAD * along, "axes fraction", "offset points", color="0.4",
+            ha="center", va="center", arrowprops={"arrowstyle": "<-", "color": "0.4"},
+        )  # fmt: skip
+    axes.set(xticks=[], yticks=[])
 
 
 def device(
@@ -85,7 +97,7 @@ def device(
     drawing within `limits` (mm)."""
     picture = Picture(linkage, devices, None)
     shown = (m for m in picture.marks if m.role in ("device", "body", "ground", "point"))
-    paint(axes, shown, picture.at_rest(q))
+    paint(axes, shown, picture.at_rest(q), view=picture.view)
     (left, right), (low, high) = limits
     axes.plot([left, right, right, left, left], [low, low, high, high, low], "k:", lw=0.6)
     axes.set_aspect("equal", adjustable="box")
@@ -107,36 +119,49 @@ def figure(scene: Scene, q: Coordinates) -> Figure:
     draw(axes, scene.linkage, q, None, scene.contacts, devices.get(""))
     picture = Picture(scene.linkage, devices, None)
     arms = (mark for mark in picture.marks if mark.role == "device")
-    paint(axes, arms, picture.at_rest(q))
+    paint(axes, arms, picture.at_rest(q), view=picture.view)
     headline(axes, f"{scene.title} at the start", 70)
     axes.grid(alpha=0.3)
     drawn.legend(fontsize="x-small", ncols=3, loc="outside lower center")
     return drawn
 
 
-def paint(axes: Axes, marks: Iterable[Mark], frame: Frame, zorder: float | None = None) -> None:
+def paint(
+    axes: Axes,
+    marks: Iterable[Mark],
+    frame: Frame,
+    zorder: float | None = None,
+    view: View = PLANE_VIEW,
+) -> None:
     """The marks that a frame has the places of."""
     labelled: set[str] = {""}
-    for mark in marks:
-        at = mark_places.points(mark, frame)
+    for mark in mark_places.in_order(marks, frame, view):
+        at = mark_places.points(mark, frame, view)
         if at is None:
             continue
         layer = (1.0 if mark.role in ROLES_BEHIND_PATHS else 3.0) if zorder is None else zorder
         look = {"zorder": layer, "label": None if mark.label in labelled else mark.label}
-        if PAINTERS.get(mark.kind, _shape)(axes, mark, at, frame, look):
+        if PAINTERS.get(mark.kind, _shape)(axes, mark, at, Seen(frame, view), look):
             labelled.add(mark.label)
 
 
-def _area(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+class Seen(NamedTuple):
+    """A frame and how it is seen."""
+
+    frame: Frame
+    view: View
+
+
+def _area(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
     from matplotlib.patches import Polygon
 
     if mark.fill is None:
-        return _line(axes, mark, at, frame, look)
+        return _line(axes, mark, at, seen, look)
     axes.add_patch(Polygon(at, fc=mark.fill, ec=mark.stroke, lw=mark.width, **look))
     return True
 
 
-def _line(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+def _line(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
     # A line's dashes are multiples of its width.
     dash: Any = (0, [each / mark.width for each in mark.dash]) if mark.dash else "-"
     look = look | {"color": mark.stroke, "lw": mark.width, "ls": dash}
@@ -144,7 +169,7 @@ def _line(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     return True
 
 
-def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+def _disc(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
     from matplotlib.patches import Circle
 
     x, y = at[0]
@@ -153,8 +178,8 @@ def _disc(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
     return True
 
 
-def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    corners = mark_places.shape(mark, frame)
+def _shape(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
+    corners = mark_places.shape(mark, seen.frame)
     axes.plot(
         *at[0], marker=np.vstack([corners, corners[:1]]), ms=2 * np.abs(corners).max(), ls="",
         mfc=mark.fill or "none", mec=mark.stroke or "none", mew=mark.width, **look,
@@ -162,8 +187,8 @@ def _shape(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool
     return True
 
 
-def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
-    tip: Any = mark_places.arrow(mark, frame)
+def _arrow(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
+    tip: Any = mark_places.arrow(mark, *seen)
     if tip is None:
         return False
     line: Any = {"color": mark.stroke, "lw": mark.width}
@@ -175,10 +200,11 @@ def _arrow(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool
     return True
 
 
-def _directions(axes: Axes, mark: Mark, at: Points, frame: Frame, look: Look) -> bool:
+def _directions(axes: Axes, mark: Mark, at: Points, seen: Seen, look: Look) -> bool:
     size = float(np.ptp([axes.get_xlim(), axes.get_ylim()], axis=1).sum())
-    for way in reach(frame, mark.vector) or ():
-        _line(axes, mark, at[0] + size * np.outer([-1, 1], way), frame, look)
+    ways = mark_places.vector(mark, *seen)
+    for way in () if ways is None else ways:
+        _line(axes, mark, at[0] + size * np.outer([-1, 1], way), seen, look)
         look = look | {"label": None}
     return True
 
@@ -204,14 +230,21 @@ def _limits(axes: Axes) -> Points:
     return limits.mean(axis=1)[:, None] + half[:, None] * [-1.0, 1.0]
 
 
-def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
+def _names(axes: Axes, linkage: Linkage, frame: Frame, view: View) -> None:
     """The names of bodies, and of joints, cut ones included, away from the middle of the mechanism;
     those of joints at one place are below each other."""
     if len(linkage.body) > MAX_NAMED_BODIES:
         return
+
+    def seen(body: str, at: Point | None) -> Points:
+        found = place(frame, Place(("poses", body), full(linkage, at)), view)
+        assert found is not None
+        return found
+
     corners = {
         body.name: outline(
-            [*_world(frame, body.name, [*attachment_points(linkage, body.name)] or [ORIGIN])]
+            [seen(body.name, at) for at in attachment_points(linkage, body.name)]
+            or [seen(body.name, None)]
         )
         for body in linkage.body
     }
@@ -226,18 +259,12 @@ def _names(axes: Axes, linkage: Linkage, frame: Frame) -> None:
     named += [(loop.name, loop.bodies[0], loop.at[0]) for loop in linkage.loop if loop.name]
     names: dict[tuple[float, ...], list[str]] = {}
     for name, body, at in named:
-        (found,) = _world(frame, body, [at or ORIGIN])
-        names.setdefault(tuple(np.round(found, 6)), []).append(name)
+        names.setdefault(tuple(np.round(seen(body, at), 6)), []).append(name)
     for where, several in names.items():
         right, up = np.array(where) > middle
         offset = (7 if right else -7, 6 if up else -6)
         side = {"ha": "left" if right else "right", "va": "bottom" if up else "top"}
         _text(axes, where, "\n".join(several), offset, "0.3", **side)
-
-
-def _world(frame: Frame, body: str, points: Iterable[Point]) -> Iterator[Points]:
-    found = (place(frame, Place(("poses", body), at)) for at in points)
-    return (each for each in found if each is not None)
 
 
 def _name(axes: Axes, i: int, name: str, corners: Points, about: Points) -> None:

@@ -6,7 +6,7 @@ It is the one description of figures, live page, replays and animations. Their p
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,15 +16,16 @@ from hapticlink.analysis.findings.episodes import EPISODES
 from hapticlink.components.device.workspace import drawn_lines
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.linkage import Body, Linkage
+from hapticlink.components.specs.linkage import Body, Joint, Linkage
 
 Point = Sequence[float]
 Points = NDArray[np.float64]
-"""x, y of points, (k, 2)."""
+"""Points, (k, 2) in the plane and (k, 3) in space."""
 Path = tuple[str | int, ...]
 """Keys, one within the other, of a pose (x m, y m, theta rad), point or vector in a frame."""
 Corners = list[list[float]]
 ORIGIN = (0.0, 0.0)
+Z = (0.0, 0.0, 1.0)
 STILL = {"poses": {"ground": (0.0, 0.0, 0.0)}}
 """A frame of what does not move."""
 BODIES = ("#4477aa", "#66ccee", "#228833", "#ccbb44", "#ee6677", "#aa3377")
@@ -79,17 +80,17 @@ SHAPES = {
 
 class Place(NamedTuple):
     """A point (m) in the frame of what is at `path` in a frame of the drawing; nothing is drawn
-    there while it is not in the frame."""
+    there while it is not in the frame. What is in space has points of three numbers."""
 
     path: Path
     point: Point = ORIGIN
 
 
 class Mark(NamedTuple):
-    """`kind`: line, area, spring, disc of radius `size` (m), rail to `size` (m) beyond both places,
-    shape of SHAPES, arrow of `size` (pt) to a newton or directions of the `vector`; `angle` (rad)
-    of a rail or shape in the frame of the last place, None where it does not turn. `when`: in
-    which state alone it is drawn. Widths and dashes are in points."""
+    """`kind`: line, area, spring, disc of radius `size` (m), rail through two places, beyond both
+    by the way from the second to a third one, shape of SHAPES, arrow of `size` (pt) to a newton or
+    directions of the `vector`; `angle` (rad) of a shape in the frame of the last place, None where
+    it does not turn. `when`: in which state alone it is drawn. Widths and dashes are in points."""
 
     role: str
     kind: str
@@ -113,13 +114,14 @@ def marks(
     devices = devices or {}
     users = ["", *(point.name for point in linkage.point)]
     users = [user for user in users if not user or user in [*devices]]
-    return [
+    drawn = [
         *obstacles(contacts),
         *(mark for user, device in devices.items() for mark in _arms(user, device)),
         *(_directions(user) for user in users),
         *_slides(linkage),
         *_springs(linkage),
         *(m for i, b in enumerate(linkage.body) for m in _body(linkage, b, BODIES[i % 6])),
+        *_rods(linkage),
         *outline_bodies(linkage, "ghost", "#333333aa", "graphics copy"),
         *outline_bodies(linkage, "ghost", KINDS["folded"][0], when="folded"),
         *_joints(linkage),
@@ -127,12 +129,32 @@ def marks(
         *(mark for user in users for mark in _handle(user)),
         *_forces(linkage, users),
     ]
+    return [*_lifted(drawn, linkage)]
+
+
+def _lifted(drawn: Iterable[Mark], linkage: Linkage) -> Iterator[Mark]:
+    """The marks with points of as many numbers as the linkage has directions."""
+    for mark in drawn:
+        at = (place._replace(point=full(linkage, place.point)) for place in mark.at)
+        yield mark._replace(at=(*at,))
+
+
+def full(linkage: Linkage, point: Point | None) -> tuple[float, ...]:
+    """A point of a body, by default its origin, with z = 0 where it has none in space."""
+    return (*(point or ORIGIN), 0.0)[: linkage.dimension]
 
 
 def outline_bodies(
     linkage: Linkage, key: str, stroke: str, label: str = "", when: str = ""
 ) -> Iterator[Mark]:
     """The bodies as thin lines, at the poses at `key` of a frame."""
+    if linkage.dimension > 2:
+        thin = Mark("ghost", "line", (), stroke, width=1.0, dash=(3.7, 1.6), when=when)
+        for body in linkage.body:
+            for at in _strokes(linkage, body, key):
+                yield thin._replace(at=at, label=label)
+                label = ""
+        return
     for i, body in enumerate(linkage.body):
         at = _corners(linkage, body, key)
         if len(at) == 1 and body.shape:
@@ -208,7 +230,24 @@ def _corners(linkage: Linkage, body: Body, key: str = "poses") -> tuple[Place, .
     return (*at,)
 
 
+def _strokes(linkage: Linkage, body: Body, key: str = "poses") -> list[tuple[Place, ...]]:
+    """The lines of a body in space, from the joint that carries it to each other point of it at
+    which something acts, to its centre of mass where there is none."""
+    carried = next(joint.at_child for joint in linkage.joint if joint.child == body.name)
+    ends = [full(linkage, at) for at in (carried, *attachment_points(linkage, body.name))]
+    first, *others = dict.fromkeys(ends)
+    others = others or [full(linkage, body.center)]
+    return [(Place((key, body.name), first), Place((key, body.name), end)) for end in others]
+
+
 def _body(linkage: Linkage, body: Body, color: str) -> Iterator[Mark]:
+    if linkage.dimension > 2:
+        for at in _strokes(linkage, body):
+            if at[0] != at[1]:
+                yield Mark("body", "line", at, color, width=5)
+            else:
+                yield Mark("body", "square", at[:1], None, f"{color}80")
+        return
     at = _corners(linkage, body)
     if len({place.path for place in at}) > 1 or len(at) == 2:
         yield Mark("body", "line", at, color, width=5)
@@ -221,27 +260,65 @@ def _body(linkage: Linkage, body: Body, color: str) -> Iterator[Mark]:
         yield Mark("body", "area", shape, color, f"{color}40", 0.8)
 
 
+def _rods(linkage: Linkage) -> Iterator[Mark]:
+    """The rods that are closures."""
+    rods = (loop for loop in linkage.loop if "distance" in loop.kind.holds)
+    for i, rod in enumerate(rods):
+        at = (*(_on(body, end) for body, end in zip(rod.bodies, rod.at, strict=True)),)
+        yield Mark("body", "line", at, "#8c8c8c", width=2.5, label="" if i else "rod")
+
+
 def _slides(linkage: Linkage) -> Iterator[Mark]:
-    """What is on the ground, and the lines along which joints slide."""
-    corners = [_outline(linkage, body) for body in linkage.body]
-    beyond = BEYOND * (max(float(np.ptp(each, axis=0).max()) for each in corners) or 0.1)
+    """What is on the ground, the lines along which joints slide, and in space the axes about which
+    they turn."""
+    points = ([*attachment_points(linkage, b.name)] or [b.center or ORIGIN] for b in linkage.body)
+    sizes = (np.ptp([full(linkage, at) for at in each], axis=0).max() for each in points)
+    beyond = BEYOND * (float(max(sizes)) or 0.1)
     for joint in linkage.joint:
         ends = (_on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent))
         if joint.parent == "ground" and joint.kind.mark:
             yield Mark("ground", "ground", ends[1:], None, "#8c8c8c")
-        if joint.kind.has_axis:
-            yield _rail(ends, joint.axis_angle, beyond)
+        if joint.kind.has_axis or (joint.kind.axes and joint.kind.slides):
+            yield _rail(linkage, ends, joint.axis, beyond)
+        elif linkage.dimension > 2 and joint.kind.axes:
+            yield from _axes(linkage, joint, beyond / 2)
     for loop in linkage.loop:
         pin, guide = (_on(b, at) for b, at in zip(loop.bodies, loop.at, strict=True))
         if "ground" in loop.bodies:
             yield Mark("ground", "ground", (pin,), None, "#8c8c8c")
-        if loop.kind.has_axis:
-            yield _rail((pin, guide), loop.axis, beyond)
+        if loop.kind.has_axis or (loop.kind.axes and loop.kind.slides):
+            axis = loop.axis if linkage.dimension == 2 else (loop.axes or (Z, Z))[1]
+            yield _rail(linkage, (pin, guide), axis, beyond)
 
 
-def _rail(ends: tuple[Place, ...], axis: float | None, beyond: float) -> Mark:
-    dash = (6.4, 1.6, 1.0, 1.6)
-    return Mark("rail", "rail", ends, GREY, None, 1.0, dash, size=beyond, angle=axis or 0.0)
+def _direction(linkage: Linkage, axis: float | Point | None, length: float) -> Points:
+    """A vector of a length (m) along an axis: an angle from x in the plane, else a direction."""
+    if linkage.dimension > 2:
+        along = np.array(Z if axis is None else axis)
+        return length * along / np.linalg.norm(along)
+    angle = axis if isinstance(axis, int | float) else 0.0
+    return length * np.array([np.cos(angle), np.sin(angle)])
+
+
+def _rail(
+    linkage: Linkage, ends: tuple[Place, Place], axis: float | Point | None, beyond: float
+) -> Mark:
+    """axis: in the frame of the second end."""
+    past = full(linkage, ends[1].point) + _direction(linkage, axis, beyond)
+    at = (*ends, ends[1]._replace(point=(*past.tolist(),)))
+    return Mark("rail", "rail", at, GREY, None, 1.0, (6.4, 1.6, 1.0, 1.6))
+
+
+def _axes(linkage: Linkage, joint: Joint, half: float) -> Iterator[Mark]:
+    """The axes about which a joint turns, the first one in its parent's frame, to `half` (m) on
+    both its sides."""
+    frames = ((joint.parent, joint.at_parent, joint.axis),
+              (joint.child, joint.at_child, joint.second_axis))  # fmt: skip
+    for body, at, axis in frames[: joint.kind.axes]:
+        along = _direction(linkage, axis, half)
+        ends = (full(linkage, at) + side * along for side in (-1, 1))
+        at = (*(_on(body, (*end.tolist(),)) for end in ends),)
+        yield Mark("rail", "line", at, GREY, width=1.5, label="axis of a joint")
 
 
 def _springs(linkage: Linkage) -> Iterator[Mark]:
@@ -254,14 +331,17 @@ def _springs(linkage: Linkage) -> Iterator[Mark]:
 def _joints(linkage: Linkage) -> Iterator[Mark]:
     for joint in linkage.joint:
         ends = _on(joint.child, joint.at_child), _on(joint.parent, joint.at_parent)
-        if joint.kind.mark == "slider":  # turned like the line along which it slides
-            yield Mark("joint", "slider", ends, fill="#ffffff", angle=joint.axis_angle)
+        if joint.kind.mark == "slider":  # in the plane turned like the line along which it slides
+            angle = joint.axis_angle if linkage.dimension == 2 else None
+            yield Mark("joint", "slider", ends, fill="#ffffff", angle=angle)
         elif joint.kind.mark:
             at = ends[0] if joint.kind.slides else ends[1]
             yield Mark("joint", joint.kind.mark, (at,), fill="#ffffff")
     for i, loop in enumerate(linkage.loop):
         label = "" if i else "joint that closes a loop"
-        yield Mark("joint", "pin", (_on(loop.bodies[0], loop.at[0]),), fill=INK, label=label)
+        ends = [_on(body, at) for body, at in zip(loop.bodies, loop.at, strict=True)]
+        for end in ends if "distance" in loop.kind.holds else ends[:1]:
+            yield Mark("joint", "pin", (end,), fill=INK, label=label)
 
 
 def _points(linkage: Linkage) -> Iterator[Mark]:

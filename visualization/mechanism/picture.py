@@ -5,35 +5,31 @@ without Python evaluates the same, as C."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
 
 from hapticlink.analysis.findings.episodes import FULL_TORQUE
+from hapticlink.components.component import Signals
 from hapticlink.components.device.motors_and_encoders import torque_function
 from hapticlink.components.device.workspace import line_function
+from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.linkage.parameters import body_parameters, loop_name
 from hapticlink.components.linkage.poses import pose_function
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
-from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.visualization.mechanism.marks import marks, point_of, state
+from hapticlink.visualization.mechanism.mark_places import world
+from hapticlink.visualization.mechanism.marks import full, marks, point_of, state
+from hapticlink.visualization.mechanism.view import view_of
 
 PORT = "user's port"
 RAW = ("ghost", "q", "lambda", "P_c", "measured")
 """What frames have instead of what is drawn."""
 LEAST_SHARE = 0.05
 """Of a constrained direction in the plane, below which it is a mere turn."""
-
-
-def require_planar(linkage: Linkage, name: str) -> None:
-    """Raises InputFault for a linkage in space, which no page and no replay draws."""
-    if linkage.dimension > 2:
-        raise InputFault(
-            f"{name}: its linkage is in space, and pages and replays draw the plane; the figures "
-            "of `hapticlink run` have it at the start and the end"
-        )
 
 
 class Part(NamedTuple):
@@ -71,7 +67,7 @@ class Picture:
         devices: Mapping[str, Device],
         contacts: Contacts | None,
     ) -> None:
-        self.marks = marks(linkage, contacts, devices)
+        self.marks, self.view = marks(linkage, contacts, devices), view_of(linkage)
         self._linkage, self._users = linkage, [*devices]
         names, poses = pose_function(linkage)
         n = poses.size1_in(0)
@@ -80,14 +76,15 @@ class Picture:
             for gives, q in (("poses", "q"), ("ghost", "ghost"))
         ]
         if linkage.loop:
-            self.parts.append(_cut_joint_forces(linkage, names, poses))
+            self.parts.append(_cut_joint_forces(linkage))
         ok, margin, gap = (ca.SX.sym(name) for name in ("branch_ok", "margin", "gap"))
         space, force = linkage.space, ca.SX.sym("F_env", linkage.space.size)
         touching = ca.logic_and(gap < 0, ca.norm_1(force) > 0)
         self.parts.append(_state("", "folded", {"branch_ok": ok}, ok == 0))
+        ways = directions() if linkage.dimension == 2 else directions_in_space()
         for user in dict.fromkeys(("", *(point.name for point in linkage.point))):
             self.parts.append(
-                Part(user, "directions", ("P_c",), (space.size**2,), directions(), sparse=True)
+                Part(user, "directions", ("P_c",), (space.size**2,), ways, sparse=True)
             )
             self.parts.append(_state(user, "outside", {"margin": margin}, margin < 0))
             self.parts.append(_state(user, "contacts", {"gap": gap, "F_env": force}, touching))
@@ -122,11 +119,10 @@ class Picture:
         frame = self.drawn({"q": q})
         arms = {part.user: part for part in self.parts if part.gives == "arms"}
         for user in self._users:
-            (_, body), (px, py) = point_of(self._linkage, user)
-            x, y, angle = frame["poses"][body]
-            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-            pose = [*(np.array([x, y]) + turn @ (px, py)), angle]
-            drawn = arms[user].value({"handle": pose})
+            held = point_of(self._linkage, user)
+            at = world(frame, held._replace(point=full(self._linkage, held.point)))
+            pose = [*(at or ()), *frame["poses"][held.path[-1]][2:3]]  # of the plane with its angle
+            drawn = arms[user].value({"handle": pose[: arms[user].sizes[0]]})
             (frame.setdefault("others", {}).setdefault(user, {}) if user else frame)["arms"] = drawn
         return frame
 
@@ -135,19 +131,24 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
     return {k: v for k, v in values.items() if k not in RAW}
 
 
-def _cut_joint_forces(linkage: Linkage, names: list[str], poses: ca.Function) -> Part:
-    """The force (N) in each joint that is cut, (2, k). It has two multipliers, a slot one; that of
-    what slides is along the normal, and a moment has no arrow."""
-    rows = sum(loop.kind.rows() for loop in linkage.loop)
-    along, q = ca.SX.sym("lambda", rows), ca.SX.sym("q", poses.size1_in(0))
-    angles, forces, row = poses(q)[2, :], [], 0
-    for loop in linkage.loop:
-        normal = angles[names.index(loop.bodies[1])] + (loop.axis or 0.0)
-        force = along[row] * ca.vertcat(-ca.sin(normal), ca.cos(normal))
-        forces.append(force if loop.kind.has_axis else along[row : row + 2])
-        row += loop.kind.rows()
-    made = ca.Function("cut", [along, q], [ca.horzcat(*forces)])
-    return Part("", "cut", ("lambda", "q"), (rows, q.numel()), made)
+def _cut_joint_forces(linkage: Linkage) -> Part:
+    """The force (N) on the first body in each joint that is cut, (d, k): what the multipliers of
+    its rows push the joint's point by, dh/dp' lambda. Moments have no arrow."""
+    lifted = tuple(
+        replace(loop, at=tuple(full(linkage, at) for at in loop.at)) for loop in linkage.loop
+    )
+    linkage = replace(linkage, loop=lifted, gear=())  # dh/dp in all directions, of the cut joints
+    p = Signals("p", body_parameters(linkage))
+    model = LinkageModel.symbolic(linkage, p)
+    along, forces, row = ca.SX.sym("lambda", sum(model.rows)), [], 0
+    for i, loop in enumerate(linkage.loop):
+        h, R = model.closures[i].h, model.frames[loop.bodies[0]].rotation
+        point, held = p[f"{loop_name(linkage, i)}.at1"], along[row : row + h.numel()]
+        forces.append(ca.densify(R @ ca.jtimes(h, point, held, True)))
+        row += h.numel()
+    made = ca.Function("cut", [along, model.q, p.vector], [ca.horzcat(*forces)])
+    cut = ca.Function("cut", [along, model.q], [made(along, model.q, p.starts)])
+    return Part("", "cut", ("lambda", "q"), (along.numel(), model.q.numel()), cut)
 
 
 def directions() -> ca.Function:
@@ -169,6 +170,23 @@ def directions() -> ca.Function:
         for share, axis in zip(shares, axes, strict=True)
     ]
     return ca.Function("directions", [p], [ca.horzcat(*shown)])
+
+
+def directions_in_space() -> ca.Function:
+    """The constrained directions of a point in space, (3, 3): an orthonormal basis of the range of
+    their projector P_c, (9,), and zeros, by Cholesky's decomposition with pivots."""
+    p = ca.SX.sym("P_c", 9)
+    rest, basis = ca.reshape(p, 3, 3), []
+    for _ in range(3):
+        longest = ca.mmax(ca.diag(rest))
+        column = ca.SX.zeros(3)
+        for k in reversed(range(3)):  # the first of several that are as long
+            column = ca.if_else(rest[k, k] >= longest, rest[:, k], column)
+        is_one = longest > LEAST_SHARE
+        way = ca.if_else(is_one, column / ca.sqrt(ca.if_else(is_one, longest, 1)), 0)
+        basis.append(way)
+        rest -= way @ way.T
+    return ca.Function("directions", [p], [ca.densify(ca.horzcat(*basis))])
 
 
 def _state(user: str, kind: str, needs: Mapping[str, ca.SX], holds: ca.SX) -> Part:

@@ -15,7 +15,7 @@ from hapticlink.analysis.findings.episodes import episodes
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.figure_axes import plain
 from hapticlink.visualization.mechanism.drawing import paint
-from hapticlink.visualization.mechanism.mark_places import MM, place
+from hapticlink.visualization.mechanism.mark_places import MM, on_page, place
 from hapticlink.visualization.mechanism.marks import KINDS, RED
 from hapticlink.visualization.replay.recorded_frames import Recorded
 
@@ -69,9 +69,11 @@ class _Panel:
         self.run, self.name, self.times = run, name, times
         self._rows = np.maximum(np.searchsorted(run.times, times + 1e-9, "right") - 1, 0)
         values = run.values()
-        self._x, self._handle = values["x"][:, :2] * MM, values.get("handle")
+        self._view = run.picture.view
+        self._x, self._handle = self._places(values["x"]), values.get("handle")
         self._frames = run.frames()
-        most = max((float(np.hypot(*f[:2])) for f in values.get("F_hand", ())), default=0.0)
+        forces = self._places(values.get("F_hand", np.zeros((0, self._view.dimension))))
+        most = float(np.hypot.reduce(forces, axis=1).max(initial=0.0)) / MM
         self._marks = [
             m._replace(size=ARROW / most) if m.kind == "arrow" and most else m
             for m in run.picture.marks
@@ -79,12 +81,16 @@ class _Panel:
         ]
         self._episodes = episodes(run.results)
 
+    def _places(self, poses: Array) -> Array:
+        """Places (mm) of poses, (k, d), or forces (mN) of wrenches."""
+        return poses[..., : self._view.dimension] * MM
+
     def limits(self) -> Array:
         """Least and largest x and y (mm) of all that moves, (2, 2)."""
         fixed = [mark for mark in self._marks if mark.role in FITTED]
-        points = [self._x]
+        points = [on_page(self._x, self._view)]
         for row in self._rows:
-            at = (place(self._frames[row], each) for mark in fixed for each in mark.at)
+            at = (place(self._frames[row], each, self._view) for mark in fixed for each in mark.at)
             points.append(np.array([each for each in at if each is not None]))
         every = np.vstack(points)
         return np.array([every.min(axis=0), every.max(axis=0)]).T
@@ -94,8 +100,9 @@ class _Panel:
         axes.clear()
         row = self._rows[k]
         axes.set(xlim=limits[0], ylim=limits[1], xticks=[], yticks=[], aspect="equal")
-        axes.plot(*self._x[: row + 1].T, color=RED, lw=0.8, alpha=0.5)
-        paint(axes, self._marks, self._frames[row])
+        path = on_page(self._x[: row + 1], self._view)
+        axes.plot(*path.T, color=RED, lw=0.8, alpha=0.5)
+        paint(axes, self._marks, self._frames[row], view=self._view)
         axes.set_title(plain(self.name), fontsize="medium", fontweight="bold", y=1.0, pad=22)
         for text, y, color in zip(self._said(k, row), (1.02, 0.02), ("0.3", None), strict=True):
             color = color or self._now(k)[1]
@@ -107,7 +114,7 @@ class _Panel:
         """Time and tracking error, and what happens."""
         text = f"{self.run.times[row]:.2f} s"
         if self._handle is not None:
-            apart = np.hypot(*(self._handle[row, :2] * MM - self._x[row]))
+            apart = np.hypot.reduce(self._places(self._handle[row]) - self._x[row])
             text += f", handle {short(round(float(apart), 1))} mm away"
         return text, fill(self._now(k)[0], 46)
 

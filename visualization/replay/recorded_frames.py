@@ -7,6 +7,7 @@ has its newest sample there, as the other blocks had it.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,7 @@ from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_P
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization.mechanism.frame_signals import candidates
-from hapticlink.visualization.mechanism.picture import PORT, Picture, require_planar
+from hapticlink.visualization.mechanism.picture import PORT, Picture
 
 PLACES = ("q", "x", "handle")
 """What a frame cannot be drawn without, of each user."""
@@ -50,7 +51,6 @@ class Recorded:
         if linkage is None:
             message = f"there is nothing to draw; `hapticlink report {folder}` has its figures"
             raise InputFault(f"{folder}: the run has no [linkage]: {message}")
-        require_planar(linkage, folder)
         self.linkage = linkage
         device = scene_part(results, "device", Device)
         self.contacts: Contacts | None = scene_part(results, "contacts", Contacts)
@@ -120,6 +120,7 @@ class Recorded:
             "title": self.results.record.scene["title"],
             "ending": summary.ending(self.results),
             "marks": [mark._asdict() for mark in self.picture.marks],
+            "view": asdict(self.picture.view),
             "times": [_round(float(t)) for t in self.times],
             "every": self.every,
             "missing": self.missing,

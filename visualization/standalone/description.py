@@ -27,7 +27,7 @@ from hapticlink.visualization.live_and_standalone.offered_controls import (
     users,
 )
 from hapticlink.visualization.mechanism.frame_signals import outputs
-from hapticlink.visualization.mechanism.picture import RAW, Part, Picture, require_planar
+from hapticlink.visualization.mechanism.picture import RAW, Part, Picture
 
 PREPARED = RANGES | {"graphics": (LEAST_RATE, RANGES["graphics"][1]), "delays": (0.0, MOST_DELAY)}
 """For what a program is prepared."""
@@ -41,7 +41,6 @@ class PageDescription:
     def __init__(self, program: Resolved, ports: Sequence[Port], name: str) -> None:
         scene, system = program.scene, program.system
         assert scene.linkage
-        require_planar(scene.linkage, name)
         picture = Picture(scene.linkage, described_devices(scene), scene.contacts)
         places, offered = _places(program), Offered(scene, system, ranges=PREPARED)
         parts = [p for p in picture.parts if {*p.needs} <= {*places.get(p.user, {})}]

@@ -20,6 +20,7 @@ from hapticlink.components.dynamics.rendered_directions import rendered_directio
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Handle, Observer
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.device_files import list_devices
 from tests.blocks import Running
 from tests.devices import device
@@ -254,3 +255,25 @@ def test_a_free_hand_that_pulls_hard_leaves_all_finite(name, hand):
         out = min(out, plant.y["workspace_margin"])
         assert np.isfinite(plant.x).all()
     assert out < -0.02
+
+
+def test_the_pantograph_is_isotropic_where_its_paper_says():
+    """Campion, Wang, Hayward 2005, equation (23): at cos(theta_1) = -25/126 + 25 sqrt(2)/42 the
+    motors' rates turn into velocities of one size in all directions; at about (-12.5, 101.2) mm of
+    the first motor, whose x axis is the other way round."""
+    pantograph = device("pantograph-mk-ii")
+    found = At(device_model(pantograph))
+    cosine = -25 / 126 + 25 * np.sqrt(2) / 42
+    y = 0.063 * np.sqrt(1 - cosine**2) + 0.075 / np.sqrt(2)
+    assert y == pytest.approx(0.1012, abs=1e-4)
+    pose = [0.0, y + pantograph.base[1], 0.0]
+    sizes = np.linalg.svd(found(pose, [0.0, 0.0])[-2])[1]
+    assert sizes[0] / sizes[1] == pytest.approx(1.0, abs=1e-12)
+    assert found(pose, [0.0, 0.0])[-3][0, 0] == pytest.approx(np.pi - np.arccos(cosine), abs=1e-12)
+
+
+def test_origins_of_numbers_are_told_by_their_words():
+    for name in list_devices():
+        assert all(vars(device(name).origin).values())
+    with pytest.raises(InputFault, match="origin: masses = 'guessed' begins with none of printed"):
+        device("2diy", {"origin.masses": "guessed"})

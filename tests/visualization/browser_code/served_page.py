@@ -32,10 +32,12 @@ Condition = Callable[[dict[str, Any]], object]
 
 
 class Served:
-    """`hapticlink view` of a scene, by default of SCENE, in a folder."""
+    """`hapticlink view` of a scene, by default of the text SCENE, in a folder."""
 
-    def __init__(self, folder: Path, *arguments: str, scene: str = "scene.toml") -> None:
-        (folder / "scene.toml").write_text(SCENE)
+    def __init__(
+        self, folder: Path, *arguments: str, scene: str = "scene.toml", text: str = SCENE
+    ) -> None:
+        (folder / "scene.toml").write_text(text)
         command = [sys.executable, "-m", "hapticlink", "view", scene]
         self.process = subprocess.Popen(
             [*command, "--no-browser", "--port", "0", "--out", "made", *arguments],

@@ -46,7 +46,7 @@ def test_the_rate_of_the_scene_without_jitter_is_no_change() -> None:
 
 
 def test_a_change_that_is_refused_is_not_kept() -> None:
-    """A hold that there is not, and a delay beyond what a scene may have."""
+    """A hold that there is not, a delay beyond what a scene may have, and a place in space."""
     settings: Settings = {}
 
     def turn(live: hl.RealTime) -> None:
@@ -55,6 +55,10 @@ def test_a_change_that_is_refused_is_not_kept() -> None:
         for message in (SetControl("set", key, "none"), SetControl("set", "holds.x", "zoh")):
             with pytest.raises(hl.InputFault, match=r"^no hold 'none'|^no control"):
                 controls.apply(message)
+        with pytest.raises(
+            hl.InputFault, match=r"^at: this hand is pulled to a place of 2 numbers"
+        ):
+            controls.apply(Hand("hand", (0.1, 0.2, 0.3)))
         live.stop()
 
     ran("closed-loop-direct", turn)
@@ -150,7 +154,7 @@ def test_a_pull_is_read() -> None:
         '{"type": "exec", "at": null}',
         '{"type": "hand"}',
         '{"type": "hand", "at": [0.1]}',
-        '{"type": "hand", "at": [0.1, 0.2, 0.3]}',
+        '{"type": "hand", "at": [0.1, 0.2, 0.3, 0.4]}',
         '{"type": "hand", "at": [0.1, "0.2"]}',
         '{"type": "hand", "at": [0.1, NaN]}',
         '{"type": "hand", "at": [0.1, 1e999]}',
