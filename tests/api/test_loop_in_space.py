@@ -57,6 +57,7 @@ def test_an_observer_beside_the_device_is_the_one_in_it():
         assert beside[signal] == pytest.approx(inside[signal], rel=0, abs=1e-12)
     assert math.isfinite(inside["haptic_device.F_hand_observed"].max())
 
+
 BAR = """
 title = "A bar on a universal joint, in the hand"
 duration = 0.25
