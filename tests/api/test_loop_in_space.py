@@ -109,3 +109,15 @@ def test_a_bar_is_felt_alike_through_every_device(name, tmp_path):
     assert np.linalg.norm(found["haptic_device.x_true"] - [0, 0, -0.1], axis=1) == pytest.approx(
         0.1, abs=0.01 * way
     )
+
+
+def test_the_distance_grows_with_the_period_of_the_frames():
+    """Without weight the hand's 0.2 N meet the mobility of the frame before alone: micrometres, in
+    proportion to the period of the frames."""
+    hand = {"type": "constant", "wrench": [-0.2, 0.0, 0.0]}
+    options = {"linkage.gravity": [0.0, 0.0, 0.0], "hand": hand}
+    runs = [hl.run("closed-loop-bricard", {**options, "graphics.rate": f}) for f in (10, 30, 60)]
+    slow, usual, fast = (1e3 * run.tracking().distance_mm.max() for run in runs)
+    assert slow < 10.0
+    assert slow / usual == pytest.approx(3.0, rel=0.1)
+    assert usual / fast == pytest.approx(2.0, rel=0.1)
