@@ -35,6 +35,8 @@ KINDS = {
     "stage": JointCoordinates,
     "paddle": JointCoordinates,
     "ideal-3": JointCoordinates,
+    "falcon": JointCoordinates,
+    "phantom-premium": JointCoordinates,
 }
 RANGED = {"joint.a_left.range": [0.5, 4.0]}
 

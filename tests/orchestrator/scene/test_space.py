@@ -39,7 +39,10 @@ REFUSED = [
     ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
     ("device={}", "device: is of the plane, and a spherical joint put the linkage in space: take"),
     ("device={ extends = 'ideal-3', handle = { angle = 'free' } }", "of three forces: take it out"),
-    (DEVICE % "loop = [{ bodies = ['a', 'ground'], at = [[0, 0], [0, 0]] }]", "take a rod, which"),
+    (
+        DEVICE % "loop = [{ bodies = ['a', 'ground'], at = [[0, 0], [0, 0]] }]",
+        'in space take "spherical"',
+    ),
     (DEVICE % "base = [0, 0, 1]", "device.joint[0] (j).axis: [0.0, 0.0, 0.0] has no length"),
     ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
     ("local_model=true", "local_model: is of the plane: leave it out"),
