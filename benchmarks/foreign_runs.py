@@ -18,10 +18,9 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -31,12 +30,15 @@ ROOT = Path(__file__).parent.parent
 LONGEST = 300.0
 """Run time (s) after which a run is ended."""
 MOST_STEPS = 2000
+ROUNDING = 1e-12
+"""Times (s) closer than that are one instant."""
+NOT_NUMBERS = ("String", "Binary", "Clock")
 NUMBERS = ("Real", "Integer", "Boolean", "Float32", "Float64")
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Of the outputs that are numbers."""
+    """Of the outputs that are numbers, or of the continuous states of an FMU without outputs."""
 
     rows: int = 0
     outputs: int = 0
@@ -56,9 +58,29 @@ class Comparison:
     """Why FMPy does not run it, in FMPy's words."""
     events: int = 0
     """How often an FMU for model exchange was in event mode."""
+    steps: int = 0
+    """Of the solver of an FMU for model exchange."""
+    fastest: float = 0.0
+    """The fastest decay (1/s) of an FMU for model exchange at its end: the largest -Re of an
+    eigenvalue of its equations."""
     inputs: str = "none"
     """Whether inputs are "set", "untouched" since the FMU ends a run otherwise, or there are
     "none"."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is run of an FMU: its interface, values of parameters and inputs, and the tolerance of
+    the solver, by default that of its DefaultExperiment."""
+
+    interface: str = "co-simulation"
+    start: Mapping[str, Any] = field(default_factory=dict)
+    tolerance: float | None = None
+
+    @property
+    def settings(self) -> str:
+        given = {**self.start, **({"tolerance": self.tolerance} if self.tolerance else {})}
+        return ", ".join(f"{name} = {value}" for name, value in given.items())
 
 
 def choose_experiment(path: Path) -> tuple[tuple[int, ...], float]:
@@ -93,6 +115,20 @@ def find_interfaces(path: Path) -> tuple[str, ...]:
     return tuple(kind for kind, element in has.items() if element is not None)
 
 
+def choose_signals(path: Path) -> list[str]:
+    """The outputs that are numbers, or the continuous states of an FMU without any."""
+    variables = model.modelVariables if (model := _describe(path)) else ()
+    outputs = [v for v in variables if v.causality == "output" and v.type not in NOT_NUMBERS]
+    states = (v.derivative for v in variables if v.derivative is not None)
+    return list(dict.fromkeys(v.name for v in outputs or states))
+
+
+def has_states(path: Path) -> bool:
+    """Whether it is an FMU for model exchange whose states a solver integrates."""
+    model = _describe(path)
+    return bool(model and model.modelExchange and model.numberOfContinuousStates)
+
+
 def choose_inputs(path: Path) -> dict[str, tuple[Any, Any]]:
     """By input that is a scalar number: its start value, and the value from half of the run on, one
     more (the other one of a Boolean), within its declared range."""
@@ -118,13 +154,13 @@ def compare(
     duration: float,
     room: Path,
     libraries: Path | None = None,
-    interface: str = "co-simulation",
-    start: Mapping[str, float] = MappingProxyType({}),
+    case: Case | None = None,
 ) -> Comparison:
     """Both runs, without setting inputs where the FMU ends a run in which they are set. libraries:
-    what Python FMUs import besides. start: values of parameters. Files are left in `room`."""
-    inputs = choose_inputs(path)
-    how = _How(interface, start, libraries)
+    what Python FMUs import besides. Files are left in `room`."""
+    case = case or Case()
+    inputs = {name: v for name, v in choose_inputs(path).items() if name not in case.start}
+    how = _How(case, choose_signals(path), libraries)
     found = _compare(path, rate, duration, inputs, room / "set", how)
     if inputs and (found.hapticlink or found.fmpy) and (room / "set" / "run").exists():
         untouched = _compare(path, rate, duration, {}, room / "untouched", how)
@@ -135,8 +171,8 @@ def compare(
 
 @dataclass(frozen=True)
 class _How:
-    interface: str
-    start: Mapping[str, float]
+    case: Case
+    signals: list[str]
     libraries: Path | None
 
 
@@ -161,18 +197,30 @@ def _compare(
         return Comparison(hapticlink=words or "its run has no rows")
     asked = {
         "path": str(path), "rate": rate, "duration": duration, "inputs": inputs, "at": at,
-        "out": str(room / "fmpy.npz"), "interface": how.interface, "start": dict(how.start),
+        "out": str(room / "fmpy.npz"), "interface": how.case.interface, "signals": how.signals,
+        "start": {
+            name: np.ravel(v).tolist() if isinstance(v, list) else v
+            for name, v in how.case.start.items()
+        },
+        "tolerance": how.case.tolerance,
     }  # fmt: skip
     (room / "asked.json").write_text(json.dumps(asked))
     status, text = _call(["benchmarks.foreign_fmpy", str(room / "asked.json")], environment)
     if status:
         text = " ".join(text.split()) or f"status {status}"
         return Comparison(len(ours["time"]), hapticlink=words, fmpy=text)
-    with np.load(room / "fmpy.npz") as theirs:
-        found = _compare_tables(ours, dict(theirs), at if inputs else math.inf, words)
+    with np.load(room / "fmpy.npz") as saved:
+        theirs = dict(saved)
+    fastest = float(theirs.pop("fastest"))
+    found = _compare_tables(ours, theirs, at if inputs else math.inf, words)
     calls = json.loads((room / "run" / "run.json").read_text())["calls"].get("fmu", {})
-    events = calls.get("events", 0)
-    return replace(found, inputs="set" if inputs else "none", events=events)
+    return replace(
+        found,
+        inputs="set" if inputs else "none",
+        events=calls.get("events", 0),
+        steps=calls.get("solver_steps", 0),
+        fastest=fastest,
+    )
 
 
 def _run_hapticlink(
@@ -186,15 +234,20 @@ def _run_hapticlink(
     how: _How,
 ) -> str:
     """What it says where it does not run the FMU to the end."""
-    values = {n: v for n, (v, _) in inputs.items()} | dict(how.start)
+    values = {n: v for n, (v, _) in inputs.items()} | dict(how.case.start)
     start = ", ".join(f"{json.dumps(n)} = {json.dumps(v)}" for n, v in values.items())
     then = ", ".join(f"{json.dumps(f'fmu.{n}')} = {json.dumps(v)}" for n, (_, v) in inputs.items())
     lines = [
         f"title = {json.dumps(path.stem)}", f"duration = {duration}", f"haptics.rate = {rate}",
         "[[fmu]]", 'name = "fmu"', f"path = {json.dumps(str(path))}",
     ]  # fmt: skip
-    if how.interface == "model-exchange":
-        lines.append(f"interface = {json.dumps(how.interface)}")
+    if how.signals:
+        signals = json.dumps([f"fmu.{name}" for name in how.signals])
+        lines.insert(3, f"record.signals = {signals}")
+    if how.case.interface == "model-exchange":
+        lines.append(f"interface = {json.dumps(how.case.interface)}")
+    if how.case.tolerance:
+        lines.append(f"tolerance = {how.case.tolerance}")
     if values:
         lines.append(f"start = {{ {start} }}")
     if inputs:
@@ -243,9 +296,9 @@ def _compare_tables(
     """At our times. FMPy has a row before and after each event: the last of an instant is what
     holds from there, but for the instant `at` (s), where our row stands before inputs change."""
     time = ours["time"]
-    rows = np.searchsorted(theirs["time"], time + 1e-9, side="right") - 1
+    rows = np.searchsorted(theirs["time"], time + ROUNDING, side="right") - 1
     if at in time:
-        rows[time == at] = np.searchsorted(theirs["time"], at - 1e-9)
+        rows[time == at] = np.searchsorted(theirs["time"], at - ROUNDING)
     if (late := np.abs(theirs["time"][rows] - time).max()) > 1e-9:
         return Comparison(len(time), hapticlink=words, fmpy=f"its rows end {late:g} s earlier")
     largest, first, outputs = (0.0, "", math.nan), math.inf, 0
@@ -270,7 +323,7 @@ def main(folders: list[str]) -> None:
             rates, duration = choose_experiment(path)
             for kind, rate in product(find_interfaces(path), rates):
                 with tempfile.TemporaryDirectory() as room:
-                    found = compare(path, rate, duration, Path(room), interface=kind)
+                    found = compare(path, rate, duration, Path(room), case=Case(kind))
                     print(path.name, kind, rate, found, flush=True)
 
 

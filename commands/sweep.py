@@ -7,7 +7,16 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from hapticlink.commands import progress
-from hapticlink.commands.options import PRINTED, Format, Output, Scene, Set, default_folder, title
+from hapticlink.commands.options import (
+    PRINTED,
+    UNCHANGED,
+    Format,
+    Output,
+    Scene,
+    SceneOptions,
+    default_folder,
+    title,
+)
 from hapticlink.orchestrator.base.terminal_output import say
 
 Vary = Annotated[
@@ -47,7 +56,7 @@ def sweep(
     vary: Vary = None,
     runs: Runs = None,
     repeat: Repeat = 1,
-    set: Set = None,
+    changes: SceneOptions = UNCHANGED,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     metric: Metric = None,
@@ -74,8 +83,8 @@ def sweep(
     folder = output.out or default_folder("sweeps", scene)
     with progress.runs(f"{title(scene)}: sweep", output.quiet) as count:
         result = hl.sweep(
-            scene, vary or (), set or (), runs=runs or (), repeat=repeat, out=folder, jobs=jobs,
-            scheduler=scheduler, metric=metric, format=format, progress=count,
+            scene, vary or (), changes.options, runs=runs or (), repeat=repeat, out=folder,
+            jobs=jobs, scheduler=scheduler, metric=metric, format=format, progress=count,
         )  # fmt: skip
     for row in result.failed[:10]:
         what = ", ".join(f"{k}={v}" for k, v in row.items() if k in result.keys)

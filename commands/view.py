@@ -102,9 +102,10 @@ def view(
         hapticlink view runs/on runs/off --export on-and-off.gif
     """
     if Path(scene).is_dir() and (second or export or not _is_scene(scene)):
-        if changes != UNCHANGED or out:
+        if changes != UNCHANGED or out or speed != 1.0:
             raise InputFault(
-                f"{scene} is the folder of a run: --set, --swap and --out apply to scenes only"
+                f"{scene} is the folder of a run: --set, --swap, --speed and --out apply to scenes "
+                "only"
             )
         if standalone:
             raise InputFault(f"--standalone: {scene} is the folder of a run; give a scene")
@@ -116,6 +117,11 @@ def view(
             f"`hapticlink view {default_folder('runs', scene)}`"
         )
     if standalone:
+        if speed != 1.0:
+            raise InputFault(
+                f"--speed {speed:g}: the page in one file has a control for it, and its address "
+                f"does it: {standalone}#speed={speed:g}"
+            )
         return _write_page(scene, changes, standalone)
     default = default_folder("runs", scene)
     root = out or default.with_name(f"{default.name}-view")
@@ -135,9 +141,11 @@ def view(
         _show(read.title, host, served_port, token, browser)
         hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"
         say(f"  {hand} the hand, in place of the scene's; Ctrl-C ends it")
+        from hapticlink.visualization.live_and_standalone.offered_controls import SPEED
         from hapticlink.visualization.live_page.session import LiveSession
 
-        session = LiveSession(read, link, root, partial(hl.RealTime, speed=speed))
+        settings = {SPEED: speed} if speed != 1.0 else None
+        session = LiveSession(read, link, root, partial(hl.RealTime, speed=speed), settings)
         with suppress(Interrupted, hl.RunInterrupted):
             session.run()
     for folder in session.recordings:

@@ -79,6 +79,11 @@ class PortSpace:
         return tuple(row >= LINEAR for row in self.rows)
 
     @property
+    def lengths(self) -> int:
+        """The number of entries that are lengths, which are the first."""
+        return self.size - sum(self.turns)
+
+    @property
     def identity(self) -> tuple[float, ...]:
         """The unit matrix, row by row."""
         return tuple(np.eye(self.size).ravel().tolist())

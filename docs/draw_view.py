@@ -44,7 +44,8 @@ OF_FILE: dict[str, tuple[str, tuple[int, int], tuple[float, float]]] = {
 (px), and where the mouse goes from the operational point (m)."""
 
 
-VIBRATES = "() => document.getElementById('said').innerText.match(/by (.+) mm/)?.[1] > 4"
+VIBRATES = """() => document.getElementById('said').innerText.match(/by (.+) mm/)?.[1] > 4
+    && !document.getElementById('ended').innerText"""
 
 
 def dragged(

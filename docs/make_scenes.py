@@ -32,7 +32,7 @@ def page(name: str) -> str:
     tried = TRY.search(text)
     assert tried, f"{name}.toml has no comment `# Try it`"
     effect = tried[1].replace("\n# ", " ")
-    base = re.search(r'^extends = "(.+)"', text, re.MULTILINE)
+    base = re.match(r'extends = "(.+)"', text)
     over = f" It extends [`{base[1]}`]({base[1]}.md)." if base else ""
     return f"""# {scene.title}
 

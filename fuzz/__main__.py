@@ -31,6 +31,7 @@ from fuzz import (
     signals_of_commands,
     special_files,
     ssps,
+    states,
 )
 from fuzz.cases import OF_SIGNALS, OUTCOMES, WITH_BELIEVED
 
@@ -39,6 +40,7 @@ ATTACKS: dict[str, tuple[Callable[[int, int], Iterator[cases.Made]], int, tuple[
     "scenes": (scenes.attack, 2700, OUTCOMES),
     "options": (options.attack, 4000, OUTCOMES),
     "ssps": (ssps.attack, 400, OUTCOMES),
+    "states": (states.attack, 500, WITH_BELIEVED),
     "archives": (archives.attack, 500, OUTCOMES),
     "c_interface": (c_interface.attack, 500_000, c_interface.OUTCOMES),
     "signals": (signals.attack, 300, OF_SIGNALS),

@@ -136,6 +136,15 @@ class Prepared:
     def system(self) -> System:
         return self.plan.system
 
+    def shares_events(self, other: Prepared) -> bool:
+        """Whether events of both may have the same ticks, and operations on the same FMUs."""
+        mine, its = self.system, other.system
+        return (
+            mine.timeline == its.timeline
+            and mine.coupling == its.coupling
+            and [fmu.description for fmu in mine.fmus] == [fmu.description for fmu in its.fmus]
+        )
+
     def differs_in_starts(self, every: System) -> bool:
         """Whether a system differs in start values alone, as `build_system` makes it of one."""
         mine = self.every
@@ -186,11 +195,7 @@ def _prepare_again(scene: Scene, every: System) -> Prepared | None:
     known = _PREPARED.take(lambda item: item.differs_in_starts(every))
     if known is None:
         return None
-    fmus = (
-        replace(fmu, starts=new.starts)
-        for fmu, new in zip(known.system.fmus, every.fmus, strict=True)
-    )
-    system = replace(known.system, fmus=tuple(fmus), energy=every.energy)
+    system = known.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
     before = replace(known.before, **describe_scene(scene))
     return replace(known, every=every, plan=known.plan.of(system), before=before)
 
@@ -358,9 +363,8 @@ def simulate(
 def simulate_together(
     scenes: Sequence[Scene], folder: Path, compiles: bool
 ) -> list[Experiment | None]:
-    """The runs of scenes with results in memory, the same ones as of `simulate`: those that differ
-    from the first in start values alone side by side, by vector instructions. None for a scene that
-    cannot be run so.
+    """The runs of scenes with results in memory, the same ones as of `simulate`: those that share
+    their events side by side, by vector instructions. None for a scene that cannot be run so.
 
     compiles: whether to compile the steps of several instances that the cache lacks. Raises
     Interrupted.
@@ -393,14 +397,17 @@ def simulate_together(
 def _run_together(
     ready: Sequence[Prepared | None], compiles: bool
 ) -> list[tuple[Outcome | None, RunResults | None]]:
-    """The outcomes and results of those that differ from the first in start values alone; None of
-    the others, and of runs that did not last."""
-    first = next((one for one in ready if one), None)
-    beside = [
-        i for i, one in enumerate(ready) if one and first and one.differs_in_starts(first.every)
-    ]
-    steps = lanes.find_steps(first.system, compiles) if first and len(beside) > 1 else {}
-    plans = {i: (one.plan, RunResults()) for i in beside if steps and (one := ready[i])}
-    outcomes = iter(run_side_by_side([*plans.values()], steps) if plans else ())
-    none = (None, None)
-    return [(next(outcomes), plans[i][1]) if i in plans else none for i in range(len(ready))]
+    """The outcomes and results of those that share their events with others; None of the rest, and
+    of runs that did not last."""
+    made: list[tuple[Outcome | None, RunResults | None]] = [(None, None)] * len(ready)
+    waiting = [(i, one) for i, one in enumerate(ready) if one]
+    while waiting:
+        first = waiting[0][1]
+        group = [each for each in waiting if each[1].shares_events(first)]
+        waiting = [each for each in waiting if not each[1].shares_events(first)]
+        steps = lanes.find_steps(first.system, compiles) if len(group) > 1 else {}
+        runs = [(one.plan, RunResults()) for _, one in group] if steps else []
+        outcomes = run_side_by_side(runs, steps) if runs else []
+        for (i, _), outcome, (_, results) in zip(group, outcomes, runs, strict=False):
+            made[i] = outcome, results
+    return made

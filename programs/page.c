@@ -7,15 +7,21 @@
 
 #define PAGE(name) __attribute__((export_name(#name))) name
 
-static char last_message[2200];
+static char cause[2200];
+static int told = 1; /* whether a cause was read: the next failure has another one */
 static double drawn_numbers[N_DRAWN + 1], work_done[2 * N_METERS + 1];
 
 static void keep_message(fmi2ComponentEnvironment environment, fmi2String name, fmi2Status status,
                          fmi2String category, fmi2String message, ...) {
-    snprintf(last_message, sizeof last_message, "%s", message);
+    if (!told || status <= fmi2Warning) return; /* the first message, of the block itself, says most */
+    snprintf(cause, sizeof cause, "%s", message);
+    told = 0;
 }
 
-const char *PAGE(message)(void) { return last_message; }
+const char *PAGE(message)(void) {
+    told = 1;
+    return cause;
+}
 
 Model *PAGE(create)(void) {
     static const fmi2CallbackFunctions callbacks = {keep_message, calloc, free, NULL, NULL};

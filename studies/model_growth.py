@@ -6,6 +6,13 @@
 target lies OFF beside the start. Writes results/model/growth.csv, the largest growth rate (1/s) by
 the map at its equilibrium and by a run, which knows nothing of the map.
 
+Next to rest `reaction` is `half-lead`, which is what the map has. So each cell is run from FAR,
+too: what is left of the handle's motion (um, from end to end in the last quarter of the run,
+infinite where the run diverges), with either of both.
+
+And the margin: the factor on the stiffnesses up to which the map is stable, with the growth rates
+of runs to both sides of it, BESIDE.
+
 The rate of a run is that of its slowest decay, or of its growth. Windows of it would mix modes that
 decay nearly alike. So its snapshots y_k, the handle's velocities of a whole period P of the map,
 are taken for those of a linear system, y_{k+1} = A y_k, whose eigenvalues z are those of A between
@@ -17,9 +24,10 @@ so that the last ones count as much.
 from __future__ import annotations
 
 import csv
+import math
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -35,7 +43,7 @@ from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.signal_names import HAND
 from studies.mismatch.cases import LINKAGES, Case
 
-OFF = 1e-9
+OFF, FAR = 1e-9, 1e-3
 """From the start to the hand's target, in x and y (m)."""
 SECONDS = 8.0
 LARGE, SMALL = 1e-4, 1e-11
@@ -45,6 +53,10 @@ SAME = 0.01
 RANK = 1e-4
 """Directions of snapshots, relative to the largest, that are none."""
 GAINS = {"medium": 100.0, "firm": 400.0}
+TOPOLOGY = 200.0, 50.0
+"""Stiffness and damping of the topology controller, its defaults."""
+BESIDE = (0.95, 1.05)
+"""Factors on a margin, which is searched to 2 % of its logarithm."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +68,9 @@ class Cell:
     rate: int
     hand: float
     late: float = 0.0
+    off: float = OFF
+    stiffer: float = 1.0
+    """The factor on the stiffnesses of the controller, dampings by its root."""
 
     @property
     def scene(self) -> str:
@@ -64,7 +79,8 @@ class Cell:
     @property
     def options(self) -> dict[str, Any]:
         x, y, angle = self.start
-        k, K = self.hand, GAINS[self.gains]
+        k, s = self.hand, self.stiffer
+        K = s * GAINS[self.gains]
         B = 2.0 * K**0.5
         return {
             "hold": "model",
@@ -75,13 +91,15 @@ class Cell:
             "controller.bias": "full",
             "controller.teleoperation.stiffness": [K, K, K / 1000],
             "controller.teleoperation.damping": [B, B, B / 1000],
+            "controller.topology.stiffness": TOPOLOGY[0] * s,
+            "controller.topology.damping": TOPOLOGY[1] * s**0.5,
             "graphics.rate": self.rate,
             "computing_time": self.late / self.rate,
             "hand": {
                 "type": "spring",
                 "stiffness": [k, k, k / 500],
                 "damping": [k / 50, k / 50, k / 20000],
-                "target": [[0.0, x + OFF, y - OFF, angle]],
+                "target": [[0.0, x + self.off, y - self.off, angle]],
             },
         }
 
@@ -141,6 +159,23 @@ def eigenvalues(snapshots: Matrix) -> Matrix:
     return found
 
 
+def left_of(cell: Cell, hold: str) -> float:
+    """What is left (um) of the motion from FAR with `hold` of F_hand."""
+    options = cell.options | {"duration": SECONDS, "holds": {"virtual_mechanism.F_hand": hold}}
+    r = hl.run(cell.scene, options, figures=False)
+    if r.run["end"]["reason"] != "duration":
+        return math.inf
+    handle = r["haptic_device.x"][:, :2]
+    return 1e6 * float(np.ptp(handle[len(handle) * 3 // 4 :], axis=0).max())
+
+
+def margin_of(cell: Cell) -> float:
+    """The factor on the stiffnesses up to which the map is stable; 0 where it is with none."""
+    found = hl.equilibrium_stability(cell.scene, cell.options)
+    assert isinstance(found, hl.Stability)
+    return found.margin.stiffness or 0.0
+
+
 def agree(told: float, found: float) -> bool:
     """Whether two growth rates are the same."""
     return abs(told - found) <= SAME * max(1.0, abs(told), abs(found))
@@ -149,15 +184,23 @@ def agree(told: float, found: float) -> bool:
 def main(folder: Path) -> None:
     """Writes the table."""
     header = ("linkage", "gains", "hz", "hand_n_per_m", "computing_time_frames", "map", "run")
+    header += ("same", "margin", "run_below_margin", "run_above_margin")
+    header += ("left_of_1_mm_um", "left_with_half_lead_um")
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "growth.csv").open("w", newline="", encoding="utf-8") as file:
         table = csv.writer(file, lineterminator="\n")
-        table.writerow((*header, "same"))
+        table.writerow(header)
         for cell in cells():
             told, P = of_map(cell)
             found = of_run(cell, P)
-            own = cell.linkage, cell.gains, cell.rate, f"{cell.hand:g}", f"{cell.late:g}"
-            row = *own, f"{told:.4g}", f"{found:.4g}", agree(told, found)
+            margin = margin_of(cell) if told < 0.0 else 0.0
+            beside = [of_run(replace(cell, stiffer=f * margin), P) for f in BESIDE if margin]
+            far = replace(cell, off=FAR)
+            left = [left_of(far, hold) for hold in ("reaction", "half-lead") if not cell.late]
+            row = [cell.linkage, cell.gains, cell.rate, f"{cell.hand:g}", f"{cell.late:g}"]
+            row += [f"{told:.4g}", f"{found:.4g}", agree(told, found), f"{margin:.3g}"]
+            row += [f"{rate:.3g}" for rate in beside] or ["", ""]
+            row += [f"{um:.2g}" for um in left] or ["", ""]
             table.writerow(row)
             print(*row, flush=True)
 

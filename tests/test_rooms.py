@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7447,
+    "components": 7490,
     "fmus": 2992,
-    "orchestrator": 16382,
+    "orchestrator": 16488,
     "programs": 1027,
-    "analysis": 8941,
-    "visualization": 3766,
+    "analysis": 9100,
+    "visualization": 3782,
     "api": 635,
-    "commands": 1612,
+    "commands": 1619,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -23,6 +23,7 @@ from hapticlink.analysis.search.acceptance import PEAK, WORK, AcceptanceLimits, 
 from hapticlink.analysis.search.search import judge_best_first
 from hapticlink.analysis.search.settings import EARLY, HOLDS
 from hapticlink.analysis.sweep.job import job
+from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import METRIC, Row
 from hapticlink.analysis.sweep.run_sweep import sweep
 from hapticlink.components.specs.device import Observer
@@ -107,6 +108,7 @@ class Advice:
 
 
 @one_blas_thread()
+@keep_processes()
 def advise(
     scene: str | Path | Scene,
     options: Sequence[str],

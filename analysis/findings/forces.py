@@ -14,10 +14,9 @@ from hapticlink.analysis.findings.tracking import (
     of_any_shape,
     of_block,
     of_port,
+    space_of,
 )
-from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import (
     CONTACT_GAP,
     DRIFT_WRENCH,
@@ -26,7 +25,7 @@ from hapticlink.orchestrator.base.signal_names import (
     TOPOLOGY_WRENCH,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
-from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
+from hapticlink.orchestrator.results.recorded_scene import described_devices
 
 WRENCHES = {
     HAND_WRENCH: "hand, F_hand",
@@ -40,8 +39,7 @@ WRENCHES = {
 def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
     """Name, times (s), force (N) and moment (N.m), 0 in space, of each wrench that a run has; names
     of further users' wrenches have their point first."""
-    linkage = scene_part(results, "linkage", Linkage)
-    space = linkage.space if linkage else PLANE
+    space = space_of(results)
     for user in find_users(results):
         signals = user.hand, user.drift, user.topology, user.environment
         for signal, name in zip(signals, WRENCHES.values(), strict=True):

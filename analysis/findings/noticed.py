@@ -17,11 +17,20 @@ by 12 dB an octave, which is a constant acceleration.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import reduce
+from itertools import combinations
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
-from hapticlink.analysis.findings.tracking import UserSignals, find_users, of_block, of_port
-from hapticlink.components.port_space import PLANE
+from hapticlink.analysis.findings.tracking import (
+    UserSignals,
+    find_users,
+    of_block,
+    of_port,
+    space_of,
+)
+from hapticlink.components.port_space import PortSpace
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY, PROJECTORS, signal_of_user
 from hapticlink.orchestrator.results.numbers import short
@@ -48,6 +57,8 @@ FAINTEST = 0.012
 J. Neurophysiology 81 (1999), 1548. Below 150 Hz their threshold rises by more than 12 dB an
 octave."""
 WINDOW = 0.25  # s
+AT_A_TIME = 64
+"""Windows of a run in memory at a time."""
 ROUNDING = 1e-9
 
 
@@ -69,41 +80,44 @@ def _of_coupling(results: Results, user: UserSignals) -> NoticedError | None:
     if table is None or not known or user.hand not in table or len(table["time"]) < 2:
         return None
     signals = (signal_of_user(signal, user.name) for signal in PROJECTORS)
-    projector = next((s for s in signals if of_block(results, s, PLANE.size, PLANE.size)), "")
-    held = of_block(results, projector, PLANE.size, PLANE.size) if projector else None
-    S = _scaling(results) if held else None
+    space = space_of(results)
+    shape = space.projector.shape
+    projector = next((s for s in signals if of_block(results, s, *shape)), "")
+    held = of_block(results, projector, *shape) if projector else None
+    S = _scaling(results, space) if held else None
 
     def of_rows(time: Vector, hand: Vector, drift: Vector) -> Vector:
         if held and S is not None:
             newest = np.searchsorted(held["time"], time + ROUNDING, "right") - 1
             drift = drift - S * np.einsum("kij,kj->ki", held[projector][newest], drift / S)
-        return np.concatenate([hand.T[:2], drift.T[:2]])
+        return np.concatenate([hand.T[: space.lengths], drift.T[: space.lengths]])
 
     felt = table.by_row(of_rows, "time", user.hand, user.drift)
-    return tracking_noticed(table["time"], felt[:2], felt[2:])
+    return tracking_noticed(table["time"], *np.split(felt, 2))
 
 
-def _scaling(results: Results) -> Vector:
+def _scaling(results: Results, space: PortSpace) -> Vector:
     """The diagonal of S."""
     from hapticlink.components.linkage.parameters import mean_link_length  # casadi
 
     length = results.record.scene["directions"]["length_scale"]
     length = length or mean_link_length(scene_part(results, "linkage", Linkage))
-    return np.array(PLANE.scaling(length), float)
+    return np.array(space.scaling(length), float)
 
 
 def tracking_noticed(time: Vector, hand: Vector, error: Vector) -> NoticedError | None:
-    """What is noticed of the error E of a hand's force F_h, both (2, n) in N; None of a run that is
-    shorter than a period of VIBRATION."""
+    """What is noticed of the error E of a hand's force F_h, a row a direction, both in N; None of a
+    run that is shorter than a period of VIBRATION."""
     T = float(np.diff(time).mean())
     count = max(1, round(1.0 / (VIBRATION * T)))
     if len(time) < count:
         return None
     mean = np.ones(count) / count
     F, E = (np.stack([np.convolve(row, mean, "valid") for row in rows]) for rows in (hand, error))
-    felt, right, off = (np.hypot(*each) for each in (F, F + E, E))
+    felt, right, off = (reduce(np.hypot, each) for each in (F, F + E, E))
     size = np.abs(felt - right) / (FORCE * np.maximum(right, WEAKEST))
-    turned = np.degrees(np.abs(np.arctan2(F[0] * E[1] - F[1] * E[0], (F * (F + E)).sum(axis=0))))
+    cross = reduce(np.hypot, (F[i] * E[j] - F[j] * E[i] for i, j in combinations(range(len(F)), 2)))
+    turned = np.degrees(np.arctan2(np.abs(cross), (F * (F + E)).sum(axis=0)))
     beyond = np.maximum(size, np.where(off > FORCE * WEAKEST, turned / DIRECTION, 0.0))
     worst = int(beyond.argmax())
     seconds = T * np.count_nonzero(beyond > 1.0)
@@ -118,29 +132,34 @@ def _of_handle(results: Results, user: UserSignals) -> Shaking | None:
     table = of_port(results, velocity)
     if table is None or results.record.scene["record"]["every"] > 1:
         return None
-    return shaking(table["time"], table.by_row(lambda v: v.T[:2], velocity))
+    lengths = space_of(results).lengths
+    return shaking(table["time"], table.by_row(lambda v: v.T[:lengths], velocity))
 
 
 def shaking(time: Vector, v: Vector) -> Shaking | None:
-    """That of velocities (2, n) in m/s; None of a run that is shorter than WINDOW, or too slow for
-    vibrations."""
+    """That of velocities in m/s, a row a direction; None of a run that is shorter than WINDOW, or
+    too slow for vibrations."""
     T = float(np.diff(time).mean()) if len(time) > 1 else np.inf
     count = round(WINDOW / T)
     if 0.5 / T <= VIBRATION or len(time) <= count:
         return None
     hertz = np.fft.rfftfreq(count, T)
-    band = hertz >= VIBRATION
+    band = slice(int(np.searchsorted(hertz, VIBRATION)), None)
     window = np.blackman(count)
     signs = np.where(2 * T * hertz[band] < 1 - ROUNDING, 2.0, 1.0)
     shares = signs / (count * (window @ window)) * np.sinc(hertz[band] * T) ** 2
-    largest, at, last = 0.0, 0, len(time) - 1 - count
-    for first in [*range(0, last, max(1, count // 4)), last]:
-        a = np.diff(v[:, first : first + count + 1]) / T
-        spectrum = np.fft.rfft((a - a.mean(axis=1, keepdims=True)) * window)[:, band]
-        squares = float((np.abs(spectrum) ** 2).sum(axis=0) @ shares)
-        if squares > largest:
-            largest, at = squares, first
-    return Shaking(float(np.sqrt(2.0 * largest)), float(time[at] + WINDOW / 2))
+    last = len(time) - 1 - count
+    firsts = [*range(0, last, max(1, count // 4)), last]
+    windows = sliding_window_view(np.diff(v) / T, count, axis=1)
+    squares = np.empty(len(firsts))
+    for k in range(0, len(firsts), AT_A_TIME):
+        a = windows[:, firsts[k : k + AT_A_TIME]]
+        spectrum = np.fft.rfft((a - a.mean(axis=2, keepdims=True)) * window)[..., band]
+        powers = (np.abs(spectrum) ** 2).sum(axis=0)
+        squares[k : k + AT_A_TIME] = [power @ shares for power in powers]
+    at = int(np.fmax(squares, 0.0).argmax())  # numbers that are none do not shake
+    middle = float(time[firsts[at]] + WINDOW / 2)
+    return Shaking(float(np.sqrt(2.0 * max(squares[at], 0.0))), middle)
 
 
 def describe_noticed(found: Mapping[str, Noticed]) -> Iterator[str]:

@@ -17,13 +17,13 @@ from hapticlink.analysis.findings.rendered import describe_devices
 from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
-    compared_directions,
+    compares_angles,
     find_handle,
     of_block,
     of_port,
+    space_of,
 )
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
-from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
@@ -128,8 +128,7 @@ def numbers(results: Results, measures: Measures | None = None) -> Iterator[str]
     yield from describe_experiment(results.record.scene)
     yield from describe_devices(results.record.scene)
     for user, error in measures.tracking.items():
-        turned = compared_directions(results, UserSignals.of(user))
-        yield _tracking(user, error, turns=turned is None or bool(turned[2, 2]))
+        yield _tracking(user, error, turns=compares_angles(results, UserSignals.of(user)))
         if user and _left(results, UserSignals.of(user).margin):
             yield f"warning: the handle of {user} left its device's workspace, and its stops acted"
     if measures.forces:
@@ -500,11 +499,13 @@ def _start(results: Results) -> Iterator[str]:
         and not results.record.fault
     ):
         start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
-        yield f"warning: {describe_start_outside(start, margin)}"
+        yield f"warning: {describe_start_outside(space_of(results), start, margin)}"
     yield from _start_apart(results)
     pulls = of_port(results, HAND_WRENCH)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
-        pull = float(PLANE.distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
+        pull = (
+            float(space_of(results).distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
+        )
         if pull > PULL:
             yield (
                 f"warning: the hand's spring begins with a pull of {short(pull)} N: begin "
@@ -524,8 +525,8 @@ def _start_apart(results: Results) -> Iterator[str]:
     may."""
     handle, point = of_port(results, HANDLE_POSE), of_port(results, POINT_POSE)
     if handle and point and len(handle["time"]) and len(point["time"]):
-        x, S = handle[HANDLE_POSE][0], point[POINT_POSE][0]
-        far, turned = float(PLANE.distance(x - S)), float(PLANE.angle(x - S))
+        off, space = handle[HANDLE_POSE][0] - point[POINT_POSE][0], space_of(results)
+        far, turned = float(space.distance(off)), float(space.angle(off))
         if far > APART or turned > TURNED:
             yield (
                 f"warning: the handle starts {short(1e3 * far)} mm and {short(turned)} rad from "

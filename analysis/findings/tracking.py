@@ -11,7 +11,9 @@ import numpy as np
 
 from hapticlink.analysis.findings.rendered import recorded_handle
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, PortSpace
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.signal_names import (
     APPLIED_TORQUES,
     BOARD_SENT_AT,
@@ -37,6 +39,7 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
+from hapticlink.orchestrator.results.recorded_scene import scene_part
 
 
 def rms(values: Vector) -> float:
@@ -46,8 +49,8 @@ def rms(values: Vector) -> float:
 
 
 class Tracking(NamedTuple):
-    """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad) at times (s). Printed, and in a
-    notebook, the largest and the root mean square of each."""
+    """Distance |x_S - x_D| (mm) and angle |theta_S - theta_D| (rad), 0 in space, at times (s).
+    Printed, and in a notebook, the largest and the root mean square of each."""
 
     time_s: Vector
     distance_mm: Vector
@@ -144,6 +147,15 @@ def of_port(results: Results, signal: str) -> Table | None:
     return of_block(results, signal, PLANE.size)
 
 
+def space_of(results: Results) -> PortSpace:
+    """That of the ports of a run, by its linkage, or by its device alone."""
+    for name, kind in (("linkage", Linkage), ("device", Device)):
+        if part := scene_part(results, name, kind):
+            space: PortSpace = part.space
+            return space
+    return PLANE
+
+
 def of_any_shape(results: Results, signal: str) -> Table | None:
     """The table that contains a signal of a block of the haptic loop, or of the FMU in its place;
     None for an FMU of others that only has the same name, of whose ports nothing is known."""
@@ -185,15 +197,16 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
     times, known, common = device["time"], device[handle], compared_directions(results, user)
+    space = space_of(results)
 
     def error(time: Vector, place: Vector) -> Vector:
         if mechanism is device and len(time) == len(times):
             held = known  # to which interpolation would lead
         else:
             held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
-        apart = PLANE.difference(place, held)
+        apart = space.difference(place, held)
         apart = apart if common is None else apart @ common
-        return np.stack([PLANE.distance(apart) * 1e3, PLANE.angle(apart)])
+        return np.stack([space.distance(apart) * 1e3, space.angle(apart)])
 
     rows = rows_until(mechanism, times[-1])
     distance, angle = mechanism.by_row(error, "time", point)
@@ -210,6 +223,12 @@ def compared_directions(results: Results, user: UserSignals = FIRST) -> Vector |
     return None if rendered.whole else rendered.compared
 
 
+def compares_angles(results: Results, user: UserSignals = FIRST) -> bool:
+    """Whether an angle belongs to both a user's point and the handle."""
+    turns, common = space_of(results).turns, compared_directions(results, user)
+    return any(turns) and (common is None or bool(common.diagonal()[list(turns)].any()))
+
+
 def path_of_point(results: Results, user: UserSignals) -> str:
     """The signal with which wrenches at a user's point are paired for their work."""
     changes = user == FIRST and of_port(results, POINT_PATH) is not None
@@ -222,8 +241,7 @@ def rows_until(table: Table, time: float) -> slice:
 
 
 def tracking(results: Results) -> tuple[Vector, Vector]:
-    """Times (s) and distances |x_S - x_D| in the plane (mm). Raises KeyError without these
-    signals."""
+    """Times (s) and distances |x_S - x_D| (mm). Raises KeyError without these signals."""
     time, distance, _ = pose_error(results)
     return time, distance
 

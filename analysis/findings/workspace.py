@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hapticlink.analysis.findings.rendered import describe_rendered
-from hapticlink.components.device.workspace import Range, extent_along, margin, workspace
+from hapticlink.components.device.workspace import Range, extents_along, margin, workspace
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 
@@ -17,17 +17,23 @@ Pose = Sequence[float]
 
 
 def lines(device: Device, start: Pose) -> Iterator[str]:
-    """The extent of the workspace, what the device renders, and whether the start pose of a scene
-    is inside it."""
+    """The extent of the workspace, what the device renders, where its numbers are from, and whether
+    the start pose of a scene is inside the workspace."""
     if device.handle.along is not None:
-        yield f"along {write_pose(device.handle.along)}: {_range(extent_along(device))} m"
+        (extent,) = extents_along(device)
+        yield f"along {write_pose(device.handle.along)}: {_range(extent)} m"
+    elif not any(device.space.turns):
+        named = zip(device.space.names, extents_along(device), strict=True)
+        along = ", ".join(f"{name} {_range(extent)} m" for name, extent in named)
+        yield f"on lines through the device's start: {along}"
     else:
         yield from _extents(device)
     if rendered := describe_rendered(device.handle):
         yield rendered
+    yield from (f"{what}: {told}" for what, told in vars(device.origin).items() if told)
     distance = float(margin(device, np.array([start]))[0])
     if distance < 0:
-        yield f"warning: {describe_start_outside(start, distance)}"
+        yield f"warning: {describe_start_outside(device.space, start, distance)}"
     else:
         yield f"the handle starts at {write_pose(start)}, {distance:.3g} m from the nearest stop"
 

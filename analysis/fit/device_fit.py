@@ -27,6 +27,7 @@ from hapticlink.analysis.fit.log import Log
 from hapticlink.components.blocks.haptic_device import haptic_device
 from hapticlink.components.device.models import device_model
 from hapticlink.components.device.motors_and_encoders import mass_and_count
+from hapticlink.components.evaluate_rows import evaluate_rows
 from hapticlink.components.specs.device import Device, Motor
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
@@ -179,7 +180,7 @@ class _Shooting:
 
     def _placed(self, poses: Matrix) -> Matrix:
         """The places, a column each, at poses (k, 3)."""
-        return np.asarray(self._at_pose.map(len(poses))(poses.T))
+        return evaluate_rows(self._at_pose, poses).T
 
     def errors(self, theta: Vector, states: Matrix) -> Vector:
         """All errors (counts), window by window."""

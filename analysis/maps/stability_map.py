@@ -10,6 +10,7 @@ from pathlib import Path
 from hapticlink.analysis.maps import boundary_lines, run_checks
 from hapticlink.analysis.maps.boundary_lines import Line
 from hapticlink.analysis.sweep.grid import Axis, grid, number
+from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.analysis.sweep.run_sweep import Judge, tabulate
 from hapticlink.orchestrator import open_scene
@@ -35,6 +36,7 @@ class Map:
 
 
 @interrupt.defer_signals()
+@keep_processes()
 def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],

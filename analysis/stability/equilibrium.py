@@ -35,7 +35,7 @@ def equilibrium(map_: LiftedMap, near: Vector) -> LinearPeriod:
         if period.moved <= TOLERANCE:
             return period
         near = _newton(map_, period)
-    raise InputFault("it has no equilibrium in a hand that holds it")
+    raise InputFault("no equilibrium is found in a hand that holds it")
 
 
 def _newton(map_: LiftedMap, period: LinearPeriod) -> Vector:

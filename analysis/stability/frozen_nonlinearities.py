@@ -3,7 +3,8 @@
 Quantisation and Coulomb friction are taken out: their slope is 0, or that of a joint that sticks,
 whatever the loop does. So are passivity controllers, and the friction of the hold `passive`, which
 act by what has been: without it that hold is `zoh`, but beside `pspm`, whose tank it draws on.
-Switches stay as they are at the equilibrium.
+Switches stay as they are at the equilibrium. The hold `reaction` is what it is next to rest, where
+it finds no stiffness of a hand: `half-lead`.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 NEXT_TO_NOTHING = 1e-18
 """Of friction (N, N.m), which sets a stiffness by a quotient and so must not be 0."""
 TAKEN_OUT, AS_AT_REST = "taken out", "as at the equilibrium"
+NEXT_TO_REST = "as half-lead, its law for motions far below 10 um in a step: larger ones may decay"
 """What becomes of a nonlinearity, at the end of its line."""
 DISCRETE = {
     ("fmu", "n_constrained"),
@@ -100,15 +102,17 @@ def describe_switches(system: System) -> list[str]:
     for c in system.connections:
         if c.hold and HOLDS[c.hold].needs in ("power", "spring") and not has_friction(c):
             lines.append(f"{c.name}: the regime of hold {c.hold}")
-        if c.needs == "reaction":
-            lines.append(f"{c.name}: the hand's stiffness that hold {c.hold} finds")
-    return [f"{line}, {AS_AT_REST}" for line in lines]
+    reacting = [c for c in system.connections if c.needs == "reaction"]
+    return [
+        *(f"{line}, {AS_AT_REST}" for line in lines),
+        *(f"{c.name}: hold {c.hold}, {NEXT_TO_REST}" for c in reacting),
+    ]
 
 
 def name_by_end(lines: Sequence[str]) -> str:
     """What lines on nonlinearities are about, each once, by what becomes of it."""
     parts = []
-    for end in (TAKEN_OUT, AS_AT_REST):
+    for end in (TAKEN_OUT, AS_AT_REST, NEXT_TO_REST):
         ours = [line.removesuffix(f", {end}") for line in lines if line.endswith(f", {end}")]
         if what := dict.fromkeys(line.partition(": ")[2] for line in ours):
             parts.append(f"{end}: {', '.join(what)}")

@@ -9,6 +9,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from hapticlink.analysis.findings.episodes import FULL_TORQUE
+from hapticlink.analysis.findings.tracking import UserSignals
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD, free, holds
@@ -25,9 +27,17 @@ from hapticlink.analysis.stability.modes import (
 from hapticlink.analysis.stability.poses import Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.shared_work import SharedWork
+from hapticlink.components.device.motors_and_encoders import motor_torques, torque_shares
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.signal_names import CONTROLLER, HAND, user_of_block
+from hapticlink.orchestrator.base.signal_names import (
+    CONTROLLER,
+    HAND,
+    MEASURED_HANDLE_POSES,
+    signal_of_user,
+    user_of_block,
+)
+from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.orchestrator.scene.scene import Scene
 
 SHARES = 3
@@ -42,8 +52,6 @@ DAMPINGS = 2.0 ** np.arange(-4, 7)
 CALMED = 0.1
 """The smallest decay rate (1/s) that counts as damped enough for a free handle. Where small motions
 decay more slowly, large ones around a pose where the constrained directions change can grow."""
-TURNING = 1e-3
-"""Their rotational damping (N.m.s/rad) over that of translations (N.s/m)."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,8 @@ class Case:
     damping: float | None = None
     """Of a free handle that grows: the damping to ground (N.s/m) that ends it; infinite where none
     of DAMPINGS does."""
+    saturated: bool = False
+    """Whether motors are at their limit there."""
 
     @property
     def free(self) -> bool:
@@ -92,6 +102,7 @@ class Case:
             "verdict": self.verdict,
             "participation": dict(self.participation),
             "damping_needed": self.damping,
+            "saturated": self.saturated,
         }
 
 
@@ -139,7 +150,7 @@ class InHands:
         for name in names if late else ():
             if user_of_block(name, CONTROLLER) is not None:
                 period = period.delayed(name, late)
-        self._T, self._seconds = place.T, place.map.period
+        self._T, self._seconds, self._space = place.T, place.map.period, place.space
         self._users = [name for name in names if user_of_block(name, HAND) is not None]
         self._period = period.fused(self._users)
 
@@ -190,7 +201,9 @@ class InHands:
     def _leading(self, hand: Hand | None) -> tuple[Mode, LinearPeriod]:
         period = self._period
         if hand is not None:
-            period = period.held(dict.fromkeys(self._users, hand_slopes(hand, self._T)))
+            period = period.held(
+                dict.fromkeys(self._users, hand_slopes(hand, self._T, self._space))
+            )
         return judged_modes(modes(period.linear, self._seconds))[0], period
 
     def _verdict(self, mode: Mode) -> str:
@@ -200,7 +213,7 @@ class InHands:
     def _damping(self) -> float:
         """The least damping of a free handle with which it comes to rest."""
         for b in DAMPINGS:
-            if self._leading(free(b, TURNING * b))[0].growth < -CALMED:
+            if self._leading(free(b, self._space))[0].growth < -CALMED:
                 return float(b)
         return float(np.inf)
 
@@ -228,9 +241,24 @@ def in_poses(
                     for name, hand in hands.items()
                     if hand is None or holds(hand) or not pose.touches
                 }
-                cases += InHands(place).cases(pose.name, lasting, bounds)
+                there = InHands(place).cases(pose.name, lasting, bounds)
+                saturated = is_saturated(read, place)
+                cases += [replace(case, saturated=saturated) for case in there]
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
         else:
             without.pop(pose.name, None)
     return cases, without
+
+
+def is_saturated(read: Scene, place: RestingScene) -> bool:
+    """Whether motors of a scene at rest are at their limit."""
+    for user, device in described_devices(read).items():
+        own = UserSignals.of(user)
+        poses = (place.signal(signal_of_user(each, user)) for each in MEASURED_HANDLE_POSES)
+        F, x = place.signal(own.motors), next((x for x in poses if len(x)), np.zeros(0))
+        if len(F) and len(x):
+            torques = motor_torques(device, F[None, :], x[None, :])
+            if torque_shares(device, torques).max() >= FULL_TORQUE:
+                return True
+    return False

@@ -13,7 +13,7 @@ import numpy as np
 
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes
 from hapticlink.components.blocks.hand import hand
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import Hand
 from hapticlink.fmus.fmu_functions import one_pass
 from hapticlink.orchestrator.base.arrays import Matrix
@@ -37,12 +37,12 @@ class HandSlopes:
 
 
 @lru_cache(64)
-def hand_slopes(spec: Hand, T: float) -> HandSlopes:
-    """Of a hand that is stepped by T (s)."""
-    made = hand(spec)
+def hand_slopes(spec: Hand, T: float, space: PortSpace = PLANE) -> HandSlopes:
+    """Of a hand at a port that is stepped by T (s)."""
+    made = hand(spec, space)
     functions = {f.name(): f for f in one_pass(made).functions}
     graph = GraphSlopes(functions, made.timing == "sampled", made.substeps)
-    n = PLANE.size
+    n = space.size
     own = [n * (*INPUTS, OUTPUT).index(v.name) + i for v in made.inputs for i in range(n)]
     n_y, n_x = n, sum(v.size for v in made.states)
     places = [*own, *range(2 * n, PORTS + n_x)]

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import (
     ArmHand,
     ConstantHand,
@@ -22,13 +23,18 @@ from hapticlink.components.specs.hand import (
 )
 from hapticlink.orchestrator.base.arrays import Vector
 
+Three = tuple[float, float, float]
 SPRINGS = (100.0, 1000.0)
 """Stiffnesses (N/m): a light touch and a firm grip."""
 FIRM = SPRINGS[-1]
 LEVER = 1 / 300
 """Rotational stiffness (N.m/rad) over that of translations (N/m)."""
-DAMPING = (5.0, 5.0, 0.01)
-"""(N.s/m, N.m.s/rad)."""
+DAMPING = 5.0
+"""Of these (N.s/m)."""
+GYRATION = 0.002
+"""Moment of inertia (kg.m2) over mass (kg), and a spring's damping likewise."""
+TURNING = 1e-3
+"""Rotational damping (N.m.s/rad) of a free handle over that of translations (N.s/m)."""
 STILL = ((0.0, 0.0, 0.0, 0.0),)
 OWN = "the scene's own hand"
 FREE = "free"
@@ -37,42 +43,51 @@ UNHELD = "as it is"
 """Of a scene that no hand of the package holds."""
 
 
-def spring_hand(stiffness: float) -> SpringHand:
+def by_direction(space: PortSpace, value: float, lever: float) -> Three:
+    """A value along lengths, and `lever` times it about axes."""
+    x, y, z = (value * lever if turns else value for turns in space.turns)
+    return x, y, z
+
+
+def spring_hand(stiffness: float, space: PortSpace = PLANE) -> SpringHand:
     """A massless hand of a stiffness (N/m)."""
-    stiff = (stiffness, stiffness, stiffness * LEVER)
-    return SpringHand(stiffness=stiff, damping=DAMPING, target=STILL)
-
-
-def arm(mass: float, stiffness: float, damping: float, grip: float, grip_damping: float) -> ArmHand:
-    """An arm (kg, N/m, N.s/m) behind a grip (N/m, N.s/m)."""
-
-    def turned(value: float) -> tuple[float, float, float]:
-        return value, value, value * LEVER
-
-    return ArmHand(
-        mass=(mass, mass, mass * 0.002),
-        stiffness=turned(stiffness),
-        damping=turned(damping),
-        grip_stiffness=turned(grip),
-        grip_damping=turned(grip_damping),
+    return SpringHand(
+        stiffness=by_direction(space, stiffness, LEVER),
+        damping=by_direction(space, DAMPING, GYRATION),
         target=STILL,
     )
 
 
-HANDS: dict[str, Hand] = {
-    "light touch": spring_hand(SPRINGS[0]),
-    "firm grip": spring_hand(FIRM),
-    "arm at rest, soft grip": arm(2.0, 10.0, 2.0, 300.0, 5.0),
-    "arm at rest, firm grip": arm(2.0, 10.0, 2.0, 2000.0, 20.0),
-    "arm in posture, firm grip": arm(1.0, 300.0, 10.0, 2000.0, 20.0),
-    "stiff arm, firm grip": arm(1.5, 1000.0, 30.0, 4000.0, 30.0),
+ARMS = {
+    "arm at rest, soft grip": (2.0, 10.0, 2.0, 300.0, 5.0),
+    "arm at rest, firm grip": (2.0, 10.0, 2.0, 2000.0, 20.0),
+    "arm in posture, firm grip": (1.0, 300.0, 10.0, 2000.0, 20.0),
+    "stiff arm, firm grip": (1.5, 1000.0, 30.0, 4000.0, 30.0),
 }
-"""By name."""
+"""Of arms mass (kg), stiffness (N/m) and damping (N.s/m), and these two of their grips."""
 
 
-def free(damping: float = 0.0, turning: float = 0.0) -> ConstantHand:
-    """No hand but a damper to ground (N.s/m, N.m.s/rad)."""
-    return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=(damping, damping, turning))
+def hands_in(space: PortSpace) -> dict[str, Hand]:
+    """The hands at a port, by name."""
+    hands: dict[str, Hand] = {
+        "light touch": spring_hand(SPRINGS[0], space),
+        "firm grip": spring_hand(FIRM, space),
+    }
+    for name, (mass, *gains) in ARMS.items():
+        k, b, grip, damped = (by_direction(space, value, LEVER) for value in gains)
+        hands[name] = ArmHand(
+            mass=by_direction(space, mass, GYRATION),
+            stiffness=k, damping=b, grip_stiffness=grip, grip_damping=damped, target=STILL,
+        )  # fmt: skip
+    return hands
+
+
+HANDS = hands_in(PLANE)
+
+
+def free(damping: float = 0.0, space: PortSpace = PLANE) -> ConstantHand:
+    """No hand but a damper to ground (N.s/m)."""
+    return ConstantHand(wrench=(0.0, 0.0, 0.0), damping=by_direction(space, damping, TURNING))
 
 
 def linearise_hand(hand: Hand) -> Hand:
@@ -88,12 +103,14 @@ def holds(hand: Hand) -> bool:
 
 
 def standing(hand: HoldingHand, pose: Sequence[float] | Vector) -> dict[str, object]:
-    """The [hand] table of a hand that stands still at a pose (m, m, rad)."""
+    """The [hand] table of a hand that stands still at a pose."""
     table = {k: v for k, v in asdict(hand).items() if v is not None and k != "interpolation"}
     return table | {"target": [[0.0, *map(float, pose)]]}
 
 
-def spring(pose: Sequence[float], wrench: Sequence[float], stiffness: float) -> dict[str, object]:
+def spring(
+    pose: Sequence[float], wrench: Sequence[float], stiffness: float, space: PortSpace = PLANE
+) -> dict[str, object]:
     """The [hand] table of a spring that presses with `wrench` on a handle at `pose`."""
-    hand = spring_hand(stiffness)
+    hand = spring_hand(stiffness, space)
     return standing(hand, [x + F / k for x, F, k in zip(pose, wrench, hand.stiffness, strict=True)])

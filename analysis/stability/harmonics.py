@@ -58,16 +58,17 @@ class Hybrid:
 
 
 class MotionScale:
-    """Rotations are scaled by the length (m) at which the device has as much impedance in both;
-    `turns` is its square, 0 without rotations. moving: orthonormal directions in which the handle
-    moves, `free` those of the device alone. A rendered constraint lets the handle move in fewer:
-    the impedance is infinite in the others, in which the mechanism does not move either."""
+    """The first `lengths` directions are translations. Rotations are scaled by the length (m) at
+    which the device has as much impedance in both; `turns` is its square, 0 without rotations.
+    moving: orthonormal directions in which the handle moves, `free` those of the device alone. A
+    rendered constraint lets the handle move in fewer: the impedance is infinite in the others, in
+    which the mechanism does not move either."""
 
-    def __init__(self, device: Response, whole: Response, T: float) -> None:
+    def __init__(self, device: Response, whole: Response, T: float, lengths: int) -> None:
         self._T, m = T, device.m
         size = np.abs(np.diag(_a_period(device)))
         moves = size > STILL * size.max()
-        linear, turned = (moves & (np.arange(m) < 2)), (moves & (np.arange(m) >= 2))
+        linear, turned = (moves & (np.arange(m) < lengths)), (moves & (np.arange(m) >= lengths))
         self._lengths = np.ones(m)
         if linear.any():
             self._lengths[turned] = np.sqrt(size[linear].mean() / size[turned])

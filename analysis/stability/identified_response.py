@@ -9,13 +9,14 @@ M_0 = D, M_i = C A^(i-1) B, and half their sum shows what is not linear. The sma
 these parameters follows from the singular values of their Hankel matrix (B. L. Ho and R. E. Kalman,
 Effective construction of linear state-variable models from input/output functions,
 Regelungstechnik 14, 1966; S. Kung, A new identification and model reduction algorithm via singular
-value decomposition, 1978). It is checked on inputs that took no part: all of them at random, longer
-than the pulses and later, so that what changes with time shows, too.
+value decomposition, 1978). It is checked on inputs that took no part: all of them at random, from
+the first step on and longer than the pulses, so that what changes with time shows, too; and on
+those of a run, which are as large as they come.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -49,8 +50,9 @@ class NotIdentified(Exception):
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedSystem:
-    """The system of the module. error: largest difference of an output on the inputs that took no
-    part, relative to its largest response."""
+    """The system of the module. Largest difference of an output on inputs that took no part,
+    relative to its largest response to them: `error` of small ones, `early` of these within the
+    SETTLING steps behind which it was identified, `on_run` of those of a run, None without one."""
 
     A: Matrix
     B: Matrix
@@ -59,14 +61,19 @@ class IdentifiedSystem:
     u0: Vector
     y0: Vector
     error: float
+    early: float = 0.0
+    on_run: float | None = None
 
     @property
     def order(self) -> int:
         return len(self.A)
 
 
-def identify(respond: Respond, u0: Vector, names: Sequence[str]) -> IdentifiedSystem:
-    """The system that an FMU is next to the inputs u0 of these names. Raises NotIdentified."""
+def identify(
+    respond: Respond, u0: Vector, names: Sequence[str], run: Matrix | None = None
+) -> IdentifiedSystem:
+    """The system that an FMU is next to the inputs u0 of these names; checked on the inputs of a
+    `run`, too. Raises NotIdentified."""
     pulses = PULSE * np.maximum(1.0, np.abs(u0))
     steps = SETTLING + LENGTH
     rest = respond(np.tile(u0, (steps, 1)))
@@ -102,7 +109,9 @@ def identify(respond: Respond, u0: Vector, names: Sequence[str]) -> IdentifiedSy
     found = IdentifiedSystem(
         A, B / pulses, scale[:, None] * C, scale[:, None] * D / pulses, u0, rest[-1], 0.0
     )
-    return replace(found, error=_check(found, respond, pulses))
+    error, early = _check(found, respond, pulses)
+    on_run = None if run is None else next(_errors(found, respond, run, slice(None)))
+    return replace(found, error=error, early=early, on_run=on_run)
 
 
 def _rounding(rest: Matrix) -> Vector:
@@ -132,24 +141,34 @@ def _realise(markov: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     return A, (root[:, None] * Vt[:r])[:, :n_u], (U[:, :r] * root)[:n_y]
 
 
-def _check(found: IdentifiedSystem, respond: Respond, pulses: Vector) -> float:
-    """The error on inputs that took no part. Raises NotIdentified where it is larger than EXACT."""
+def _check(found: IdentifiedSystem, respond: Respond, pulses: Vector) -> tuple[float, float]:
+    """The errors on small inputs that took no part, behind SETTLING steps and in these. Raises
+    NotIdentified where the first one is larger than EXACT."""
     first = SETTLING + SETTLING // 8
     inputs = np.tile(found.u0, (first + CHECKED, 1))
-    rest = respond(inputs)[first:]
-    draws = np.random.default_rng(1).uniform(-1.0, 1.0, (CHECKED, len(pulses)))
-    inputs[first:] += pulses * draws
-    moved = respond(inputs)[first:] - rest
-    x, predicted = np.zeros(found.order), np.empty_like(moved)
-    for k, du in enumerate(inputs[first:] - found.u0):
-        predicted[k] = found.C @ x + found.D @ du
-        x = found.A @ x + found.B @ du
-    largest = np.maximum(np.abs(moved).max(axis=0), _rounding(rest))
-    error = float((np.abs(predicted - moved).max(axis=0) / largest).max(initial=0.0))
+    draws = np.random.default_rng(1).uniform(-1.0, 1.0, (len(inputs) - 1, len(pulses)))
+    inputs[1:] += pulses * draws
+    error, early = _errors(found, respond, inputs, slice(first, None), slice(SETTLING))
     if not error <= EXACT:
         raise NotIdentified(
             f"a linear system of order {found.order}, identified by pulses, errs by {error:.2g} of "
             f"its response to other inputs: it is not linear, has a memory of more than "
             f"{LENGTH // 2} steps, or changes with time"
         )
-    return error
+    return error, early
+
+
+def _errors(
+    found: IdentifiedSystem, respond: Respond, inputs: Matrix, *parts: slice
+) -> Iterator[float]:
+    """For parts of the inputs, how far the system is from what these change, from the first of them
+    on, relative to the largest change of an output there."""
+    rest = respond(np.tile(inputs[0], (len(inputs), 1)))
+    moved = respond(inputs) - rest
+    x, wrong = np.zeros(found.order), np.empty_like(moved)
+    for k, du in enumerate(inputs - inputs[0]):
+        wrong[k] = found.C @ x + found.D @ du - moved[k]
+        x = found.A @ x + found.B @ du
+    for part in parts:
+        largest = np.maximum(np.abs(moved[part]).max(axis=0), _rounding(rest))
+        yield float((np.abs(wrong[part]).max(axis=0) / largest).max(initial=0.0))

@@ -22,10 +22,10 @@ from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import hardest_first, in_poses, worst_case
 from hapticlink.analysis.stability.hands import (
     FREE,
-    HANDS,
     OWN,
     OWN_FREE,
     UNHELD,
+    hands_in,
     holds,
     linearise_hand,
 )
@@ -38,7 +38,6 @@ from hapticlink.analysis.stability.poses import (
     find_rest_poses,
     is_hand_replaced,
     presses,
-    require_planar_port,
     rest,
     simulate_scene,
 )
@@ -51,6 +50,7 @@ from hapticlink.analysis.stability.told_steps import Progress, Steps
 from hapticlink.analysis.stability.varying_rate import VaryingStability, varies, varying_stability
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.stability.workspace_grid import grid_poses
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import Hand
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator import open_scene
@@ -102,8 +102,9 @@ def stability(
         return _judge_at_rest(read, bounds, progress)
     if read.linkage is None:
         raise InputFault("no linkage: nothing that a hand could hold")
-    require_planar_port(read)
-    hands = hands_of(read.hand)
+    if grid and read.linkage.dimension > 2:
+        raise InputFault("places on a grid are of the plane: leave out --grid of a scene in space")
+    hands = hands_of(read.hand, read.space)
     read, rounded = short(with_quicker_fmus(read))
     with interrupt.defer_signals(), process_cache.keep_unpacked(), prefer_compiled():
         steps = Steps(progress, 1)
@@ -119,7 +120,8 @@ def stability(
                 raise InputFault(fault)
             return found, broken_limit(changed, run)
 
-        judged = _judge(read, visits, hands, bounds, steps, rounded)
+        work = SharedWork(run=lambda: own_run)
+        judged = _judge(read, visits, hands, bounds, steps, rounded, work)
     return replace(judged, run_fault=own_fault)
 
 
@@ -154,18 +156,23 @@ def _require_bounds(bounds: Bounds) -> None:
         )
 
 
-def hands_of(hand: Hand) -> dict[str, Hand]:
-    """The family, with the hand of a scene, and no hand where that has no stiffness."""
+def hands_of(hand: Hand, space: PortSpace = PLANE) -> dict[str, Hand]:
+    """The family at a port, with the hand of a scene, and no hand where that has no stiffness."""
+    family = hands_in(space)
     if holds(hand):
-        return {OWN: linearise_hand(hand), **HANDS}
+        return {OWN: linearise_hand(hand), **family}
     damped = any(getattr(hand, "damping", None) or ())
-    return {**HANDS, (OWN_FREE if damped else FREE): linearise_hand(hand)}
+    return {**family, (OWN_FREE if damped else FREE): linearise_hand(hand)}
+
+
+def _simulate_span(read: Scene) -> Results:
+    return simulate_scene(read, {"duration": SPAN, "stop_when": ""})
 
 
 def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
     """The poses that a scene's own run visits, and that run."""
     assert read.linkage is not None
-    run = simulate_scene(read, {"duration": SPAN, "stop_when": ""})
+    run = _simulate_span(read)
     poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
@@ -184,7 +191,8 @@ def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> St
     steps = Steps(progress, 1)
     steps.begin("the run until it rests")
     try:
-        return _judge(read, _at_rest, hands, bounds, steps, rounded)
+        work = SharedWork(run=lambda: _simulate_span(read))
+        return _judge(read, _at_rest, hands, bounds, steps, rounded, work)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:
             raise
@@ -209,9 +217,10 @@ def _judge(
     bounds: Bounds,
     steps: Steps,
     rounded: str,
+    work: SharedWork,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
-    (visited, _), work = visits(read), SharedWork()
+    visited, _ = visits(read)
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(

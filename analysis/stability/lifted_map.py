@@ -300,7 +300,7 @@ def open_lifted_map(
     exactly = replace(system.coupling.iteration, method="newton", tolerance=tolerance)
     system = replace(system, coupling=replace(system.coupling, iteration=exactly))
     work = work or SharedWork()
-    system = with_stand_ins(system, work.responses)
+    system = with_stand_ins(system, work)
     with ExitStack() as stack, np.errstate(invalid="ignore", over="ignore"):
         simulation = Simulation(system, RunResults(), stack)
         simulation.step_checks.clear()

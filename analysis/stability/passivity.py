@@ -48,7 +48,7 @@ from hapticlink.analysis.stability.port_response import (
     mechanism_port,
     response,
 )
-from hapticlink.analysis.stability.poses import in_own_hand, require_planar_port
+from hapticlink.analysis.stability.poses import in_own_hand
 from hapticlink.analysis.stability.short_hyperperiod import round_rate
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
@@ -143,7 +143,6 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     device, or with a hyperperiod of more than 600 forces with frames of whole haptic periods, too.
     """
     read, said = open_scene.load(scene, options), ""
-    require_planar_port(read)
     hand, mechanism, count = _ports(read)
     if count > LARGEST and read.graphics is not None:
         read, said = round_rate(read)
@@ -180,7 +179,7 @@ def of(
             f"user's port: {hand.handle} takes {whole.forces // whole.m} forces in "
             f"{P / T:.4g} haptic periods"
         )
-    port = _UserPort(whole, device, T, P)
+    port = _UserPort(whole, device, T, P, hand.lengths)
     angles = port.grid(np.union1d(_angles(port.N), port.scale.resonances(whole)))
     angles = with_worst(angles, lambda angle: max(port.necessary(angle)))
     curve = [pair for angle in angles for pair in port.curve(angle)]
@@ -215,11 +214,11 @@ def at_zero(shortage: Callable[[float], float], angle: float) -> float:
 
 class _UserPort:
     """The port of all that runs, `whole`, and of the device alone, at angles w P of the hyperperiod
-    P (s); N haptic periods T (s) in each."""
+    P (s); N haptic periods T (s) in each. The first `lengths` directions are translations."""
 
-    def __init__(self, whole: Response, device: Response, T: float, P: float) -> None:
+    def __init__(self, whole: Response, device: Response, T: float, P: float, lengths: int) -> None:
         self._whole, self._device, self._P = whole, device, P
-        self.N, self.scale = whole.forces // whole.m, MotionScale(device, whole, T)
+        self.N, self.scale = whole.forces // whole.m, MotionScale(device, whole, T, lengths)
         self._moving_of_free = self.scale.free.T @ self.scale.moving
 
     def _impedances(self, angle: float) -> tuple[Hybrid, Complex]:

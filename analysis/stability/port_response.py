@@ -56,6 +56,8 @@ class HandPort:
     """Those of the pose of the handle."""
     moving: tuple[int, ...]
     """Those of its velocity."""
+    lengths: int
+    """How many of its directions, the first ones, are lengths."""
 
 
 @dataclass(frozen=True)
@@ -79,9 +81,10 @@ def hand_port(system: System) -> HandPort:
     for c in system.connections:
         found = bond(c, signals) if system.block(c.source) == HAND else None
         if found:
-            inputs = tuple(c.inputs[i].name for i in found.entries)
-            forces = tuple(found.of(signals.sources(c)))
-            return HandPort(c.source, c.target, inputs, forces, found.moved, found.moving)
+            inputs = [c.inputs[i] for i in found.entries]
+            names, forces = tuple(i.name for i in inputs), tuple(found.of(signals.sources(c)))
+            lengths = sum(i.unit != "N.m" for i in inputs)
+            return HandPort(c.source, c.target, names, forces, found.moved, found.moving, lengths)
     raise InputFault("no hand pushes on an FMU by a force with a displacement: no port of a user")
 
 

@@ -11,13 +11,20 @@ from pathlib import Path
 import numpy as np
 
 from hapticlink.analysis.findings.tracking import table_of
-from hapticlink.analysis.stability.hands import FIRM, linearise_hand, spring, standing
+from hapticlink.analysis.stability.hands import (
+    FIRM,
+    TURNING,
+    by_direction,
+    linearise_hand,
+    spring,
+    standing,
+)
 from hapticlink.analysis.stability.lifted_map import hyperperiod
-from hapticlink.analysis.stability.resting_scene import RestingScene, resting
+from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints
 from hapticlink.analysis.stability.stand_in import find_stand_ins
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base import temporary_folders
@@ -42,17 +49,19 @@ from hapticlink.orchestrator.system.timeline import timeline
 SETTLING, CALM = 10.0, 0.2
 """Time (s) in which a wrench takes a damped handle near rest, and its last part, over which the
 pose is averaged."""
-SETTLED_BY = [5.0, 5.0, 0.005]
-"""Damping of the handle meanwhile (N.s/m, N.m.s/rad)."""
+SETTLED_BY = 5.0
+"""Damping of the handle meanwhile (N.s/m)."""
 LONGEST, LATE = 60.0, 0.1
 """Time (s) after which a run that has not come to rest does not, and its last part."""
 AT_REST = 1e-3
 """Rate (rad/s, m/s) of the fastest joint in that part, up to which a run rests."""
-LEAVING, OFF = 20.0, (2e-4, 0.0, 2e-3)
+LEAVING, OFF = 20.0, 2e-4
 """Duration (s) of a run that shows where a divergence leads, and how far off the hand is at first
-(m, m, rad)."""
-NEAR = (5e-3, 5e-3, 0.05)
-"""Motions (m, m, rad) up to which it leads nowhere, as to an equilibrium beside a singular pose."""
+(m), along x and along z or about it."""
+NEAR = 5e-3
+"""Motions (m) up to which it leads nowhere, as to an equilibrium beside a singular pose."""
+PER_METRE = 10.0
+"""Angles (rad) that are as far off as a length of 1 m, or as much moved."""
 LIGHT = 0.25
 """The force (N) with which a hand presses where that of the run slides off, as from a corner or a
 disc along the spring that the coupling is."""
@@ -60,8 +69,8 @@ disc along the spring that the coupling is."""
 
 @dataclass(frozen=True)
 class Pose:
-    """The pose of a run at a time (s), by joint and of the operational point (m, m, rad), and the
-    wrench (N, N, N.m) with which a hand presses there against what touches."""
+    """The pose of a run at a time (s), by joint and of the operational point, and the wrench with
+    which a hand presses there against what touches."""
 
     time: float
     joints: dict[str, float | list[float]]
@@ -71,6 +80,8 @@ class Pose:
     """The poses of the points that further users hold."""
     title: str = ""
     """What it is, instead of a moment."""
+    space: PortSpace = PLANE
+    """Of the operational point."""
 
     @property
     def touches(self) -> bool:
@@ -81,7 +92,7 @@ class Pose:
     def lighter(self) -> Pose:
         """Pressed with LIGHT."""
         F = np.array(self.press)
-        return replace(self, press=tuple((F * LIGHT / PLANE.distance(F)).tolist()))
+        return replace(self, press=tuple((F * LIGHT / self.space.distance(F)).tolist()))
 
     @property
     def name(self) -> str:
@@ -92,11 +103,13 @@ class Pose:
         comes further away than NEAR; one that fails does."""
         if not isinstance(hand, HoldingHand):
             return True
-        held = {"hand": standing(hand, np.add(self.point, OFF))}
+        off = by_direction(self.space, OFF, PER_METRE)
+        held = {"hand": standing(hand, np.add(self.point, (off[0], 0.0, off[2])))}
         changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
         run = simulate_scene(read, changes)
         moved = np.abs(_read_poses(run)[POINT_POSE] - self.point).max(axis=0)
-        return bool(run.record.fault) or bool((moved > NEAR).any())
+        near = by_direction(self.space, NEAR, PER_METRE)
+        return bool(run.record.fault) or bool((moved > near).any())
 
     @property
     def started(self) -> dict[str, object]:
@@ -107,17 +120,10 @@ class Pose:
     def held(self) -> dict[str, object]:
         """The options with which a spring hand that stands still holds a scene in this pose."""
         no_force = (0.0, 0.0, 0.0)
-        hands = {f"hands.{u}": spring(x, no_force, FIRM) for u, x in self.others.items()}
-        return {"hand": spring(self.point, self.press, FIRM), **hands}
-
-
-def require_planar_port(scene: Scene) -> None:
-    """Raises InputFault for a linkage in space, which hands from soft to firm do not hold."""
-    if scene.linkage and scene.linkage.dimension > 2:
-        raise InputFault(
-            "its port is judged in the plane: in space `hapticlink stability --equilibrium` judges "
-            "the scene's own hand, where it comes to rest"
-        )
+        hands = {
+            f"hands.{u}": spring(x, no_force, FIRM, self.space) for u, x in self.others.items()
+        }
+        return {"hand": spring(self.point, self.press, FIRM, self.space), **hands}
 
 
 def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
@@ -139,7 +145,7 @@ def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pos
     one if there was any. Raises InputFault where the poses are not recorded."""
     table = _read_poses(run)
     moments = [int(i * len(table["time"]) / count) for i in range(count)]
-    size = PLANE.distance(_contact_force(table, linkage))
+    size = linkage.space.distance(_contact_force(table, linkage))
     touching = np.flatnonzero(size)
     if len(touching):
         moments.append(int(touching[np.argsort(size[touching])[len(touching) // 2]]))
@@ -152,7 +158,8 @@ def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
     that fails."""
     assert isinstance(read.hand, ConstantHand)
     wrench = read.hand.wrench
-    damped = {"type": "constant", "wrench": list(wrench), "damping": SETTLED_BY}
+    damping = by_direction(linkage.space, SETTLED_BY, TURNING)
+    damped = {"type": "constant", "wrench": list(wrench), "damping": list(damping)}
     run = simulate_scene(read, {"hand": damped, "duration": SETTLING, "stop_when": ""})
     if run.record.fault:
         raise InputFault(f"its run with a damped handle fails: {run.record.fault.message}")
@@ -257,13 +264,9 @@ def _read_poses(run: Results) -> Table:
 
 
 def _contact_force(table: Table, linkage: Linkage) -> Matrix:
-    """F_env where a body touches something or a joint is at its limit. F_env alone does not tell:
-    it has other hands and efforts on joints, too."""
     if ENVIRONMENT_WRENCH not in table:
         return np.zeros((len(table["time"]), 3))
-    limited = any(j.limits for j in linkage.joint) or any(j.limits for j in linkage.loop)
-    touches = table[CONTACT_GAP] < 0.0 if CONTACT_GAP in table else np.zeros(1, bool)
-    return np.where((touches | limited)[:, None], table[ENVIRONMENT_WRENCH], 0.0)
+    return contact_force(linkage, table[ENVIRONMENT_WRENCH], table.get(CONTACT_GAP))
 
 
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
@@ -275,6 +278,7 @@ def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
         tuple(table[POINT_POSE][i].tolist()),
         tuple((0.0 - _contact_force(table, linkage)[i]).tolist()),
         {user: tuple(table[_point(user)][i].tolist()) for user in users},
+        space=linkage.space,
     )
 
 
@@ -304,7 +308,7 @@ def at_pose(
 
 
 def _require_touch(pose: Pose, place: RestingScene) -> None:
-    if pose.touches and not place.touches:
+    if pose.touches and not place.contact.any():
         raise InputFault("it comes off what it touches")
 
 

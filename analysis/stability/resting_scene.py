@@ -20,9 +20,11 @@ from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
+from hapticlink.components.port_space import PLANE, PortSpace
+from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
-from hapticlink.orchestrator.base.signal_names import ENVIRONMENT_WRENCH, HAND
+from hapticlink.orchestrator.base.signal_names import CONTACT_GAP, ENVIRONMENT_WRENCH, HAND
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.scene.overrides import Options
@@ -36,6 +38,14 @@ SURE = 0.01
 """Uncertainty of an eigenvalue below which it may count as 1."""
 
 
+def contact_force(linkage: Linkage, F_env: Matrix, gap: Vector | None) -> Matrix:
+    """F_env (k, 3) where a body touches something, by the least `gap` (k,), or a joint is at its
+    limit. F_env alone does not tell: it has other hands and efforts on joints, too."""
+    limited = any(j.limits for j in linkage.joint) or any(j.limits for j in linkage.loop)
+    touches = np.zeros(len(F_env), bool) if gap is None else gap < 0.0
+    return np.where((touches | limited)[:, None], F_env, 0.0)
+
+
 def _is_felt(mode: Mode) -> bool:
     """Whether a mode that grows is more than a drift."""
     return kind(mode.growth, mode.omega / (2 * np.pi), DRIFT) != "drift"
@@ -44,7 +54,8 @@ def _is_felt(mode: Mode) -> bool:
 class RestingScene:
     """A scene at its equilibrium in the hand that it has, searched from a `start`, such as the
     `equilibrium` of the same scene at other rates. T: the haptic period (s). gains: those of its
-    laws, with which the map begins `scaled`. Raises InputFault where there is no equilibrium."""
+    laws, with which the map begins `scaled`. space: of its ports. Raises InputFault where there is
+    no equilibrium."""
 
     def __init__(
         self,
@@ -53,8 +64,11 @@ class RestingScene:
         T: float,
         start: Vector | None = None,
         scaled: float = 1.0,
+        linkage: Linkage | None = None,
+        space: PortSpace = PLANE,
     ) -> None:
         self.map, self.gains, self.T = map_, gains, T
+        self._linkage, self.space = linkage, space
         if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
             start = map_.start
         self._home = equilibrium(map_, start)
@@ -71,9 +85,16 @@ class RestingScene:
         return self._home.point
 
     @property
-    def touches(self) -> bool:
-        """Whether a contact force acts at the `equilibrium`."""
-        return bool(self.signal(ENVIRONMENT_WRENCH).any())
+    def contact(self) -> Vector:
+        """The contact force (3,) at the `equilibrium`, 0 without contact."""
+        return self._contact_at(self._home.point)
+
+    def _contact_at(self, point: Vector) -> Vector:
+        F, gap = (point[self._places(port)] for port in (ENVIRONMENT_WRENCH, CONTACT_GAP))
+        if self._linkage is None or not len(F):
+            return np.zeros(3)
+        found: Vector = contact_force(self._linkage, F[None], gap if len(gap) else None)[0]
+        return found
 
     def change(self, parameters: Sequence[tuple[str, Scalar, float]]) -> None:
         """Sets tunable parameters, by FMU, and moves to the equilibrium with them. Raises
@@ -86,7 +107,8 @@ class RestingScene:
         """Whether no mode grows, neutral ones and slow drift aside, with gains scaled by `scales`
         in a spring hand of the stiffness `hand` (N/m)."""
         try:
-            period = self.period(scales).held({HAND: hand_slopes(spring_hand(hand), self.T)})
+            slopes = hand_slopes(spring_hand(hand, self.space), self.T, self.space)
+            period = self.period(scales).held({HAND: slopes})
             all_modes = modes(period.linear, self.map.period)
         except (FmuFault, InputFault):  # diverges at once
             return False
@@ -122,7 +144,7 @@ class RestingScene:
         if scales != self._known[0]:
             self.map.set_parameters([*self.gains.parameters(scales)])
             period = equilibrium(self.map, self._home.point)
-            if self.touches and not period.point[self._places(ENVIRONMENT_WRENCH)].any():
+            if self.contact.any() and not self._contact_at(period.point).any():
                 raise InputFault("it comes off what it touches")
             self._known = dict(scales), period
         return self._known[1]
@@ -158,7 +180,7 @@ def resting_system(
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
             map_ = stack.enter_context(open_lifted_map(softer, read, work))
-            return RestingScene(map_, gains, T, start, scale)
+            return RestingScene(map_, gains, T, start, scale, read.linkage, read.space)
 
         try:
             place = rested(1.0)

@@ -79,8 +79,9 @@ class SceneVariants:
         """The spectral radius of the scene with `options`, around its equilibrium in its own hand.
         Raises InputFault and FmuFault where it has none."""
         self._rest(options)
-        hands = {HAND: hand_slopes(self._hand, self._place.T)} if self._hand else {}
-        period = self._place.period({}).held(hands)
+        place, hand = self._place, self._hand
+        held = {HAND: hand_slopes(hand, place.T, place.space)} if hand else {}
+        period = place.period({}).held(held)
         leading = judged_modes(modes(period.linear, self._place.map.period))[:1]
         radius, uncertainty = (abs(leading[0].z), leading[0].uncertainty) if leading else (0.0, 0.0)
         return Radius(radius, uncertainty, self._place.map.period)

@@ -11,16 +11,20 @@ from typing import Any
 import numpy as np
 
 from hapticlink.analysis.stability.identified_response import (
+    EXACT,
+    SETTLING,
     IdentifiedSystem,
     NotIdentified,
     identify,
 )
+from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.state_vector import LAYOUT, has_layout
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.fmi.description import STATE
 from hapticlink.orchestrator.fmi.instance import Instance
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
+from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.simulation import Simulation
@@ -36,27 +40,44 @@ Known = dict[tuple[Any, ...], IdentifiedSystem]
 
 @dataclass(frozen=True)
 class StandIn:
-    """What stands in the place of an FMU, for the record: its order, and its largest error on
-    inputs that took no part, relative to the largest response of the output."""
+    """What stands in the place of an FMU, for the record: its order, and its errors on inputs that
+    took no part, those of an IdentifiedSystem."""
 
     fmu: str
     order: int
     error: float
+    early: float
+    on_run: float | None
 
     def __str__(self) -> str:
-        return (
+        said = (
             f"{self.fmu}: its state cannot be read; a linear system of order {self.order} stands "
             f"for it, identified by its response to pulses; on other inputs it errs by "
             f"{self.error:.1g} of the largest response"
         )
+        if self.on_run is not None:
+            said += f", on those of the scene's own run by {self.on_run:.1g}"
+        if self.early > EXACT:
+            said += (
+                f"; in its first {SETTLING} steps the FMU is another system, from which this one "
+                f"differs by {self.early:.1g}: judged is only what it is behind them"
+            )
+        elif self.on_run is not None and self.on_run > EXACT:
+            said += (
+                "; over that run the FMU is not this system, as where its law switches or is "
+                "limited: judged are only smaller motions, next to where the scene starts"
+            )
+        return said
 
 
 def find_stand_ins(known: Known) -> tuple[StandIn, ...]:
     """Of each FMU the one with the largest error."""
     worst: dict[str, StandIn] = {}
     for (name, *_), found in known.items():
-        each = StandIn(name, found.order, found.error)
-        worst[name] = max(worst.get(name, each), each, key=lambda s: s.error)
+        each = StandIn(name, found.order, found.error, found.early, found.on_run)
+        worst[name] = max(
+            worst.get(name, each), each, key=lambda s: (max(s.early, s.on_run or 0.0), s.error)
+        )
     return tuple(worst.values())
 
 
@@ -65,7 +86,7 @@ def record_stand_ins(found: Sequence[StandIn]) -> dict[str, Any]:
     return {"stand_ins": [asdict(each) for each in found]} if found else {}
 
 
-def with_stand_ins(system: System, known: Known) -> System:
+def with_stand_ins(system: System, work: SharedWork) -> System:
     """The system with linear ones in the place of FMUs whose state cannot be read. Raises
     InputFault for one whose response tells none."""
     system = replace(system, fmus=tuple(map(_with_declared_states, system.fmus)))
@@ -73,7 +94,7 @@ def with_stand_ins(system: System, known: Known) -> System:
     if not unread:
         return system
     start = _read_start(system)
-    fmus = (_identified(system, u, start, known) if u.name in unread else u for u in system.fmus)
+    fmus = (_identified(system, u, start, work) if u.name in unread else u for u in system.fmus)
     return replace(system, fmus=tuple(fmus))
 
 
@@ -109,8 +130,9 @@ def _read_start(system: System) -> Callable[[Iterable[Connection]], Brought]:
 
 
 def _identified(
-    system: System, fmu: Fmu, start: Callable[[Iterable[Connection]], Brought], known: Known
+    system: System, fmu: Fmu, start: Callable[[Iterable[Connection]], Brought], work: SharedWork
 ) -> Fmu:
+    known: Known = work.responses
     clock = system.timeline.clock(fmu.clock)
 
     def refuse(why: str) -> InputFault:
@@ -132,7 +154,10 @@ def _identified(
     if key not in known:
         try:
             names = [s.name for s in inputs]
-            known[key] = identify(lambda u: _respond(system, fmu, inputs, once, u, T), u0, names)
+            run = work.run and _inputs_in(work.run(), system.into(fmu.name), T)
+            known[key] = identify(
+                lambda u: _respond(system, fmu, inputs, once, u, T), u0, names, run
+            )
         except NotIdentified as why:
             raise refuse(f"its response to its inputs tells no linear system: {why}") from None
         except FmuFault as fault:
@@ -148,6 +173,21 @@ def _identified(
         return LinearInstance(response, inputs, once[0], *arguments)
 
     return replace(fmu, description=described, isolate=False, stand_in=stand_in)
+
+
+def _inputs_in(run: Results, connections: Iterable[Connection], T: float) -> Matrix | None:
+    """What the sources of connections put out in a run, at the steps of T (s); None where one of
+    them is not recorded."""
+    columns = []
+    for name in (f"{c.source}.{s.name}" for c in connections for s in c.outputs):
+        table = next((table for table in run.tables.values() if name in table), None)
+        if table is None or not len(table["time"]):
+            return None
+        at = np.arange(round(table["time"][-1] / T)) * T
+        rows = np.searchsorted(table["time"], at + T / 1e6, side="right") - 1
+        columns.append(table[name][rows])
+    steps = min(map(len, columns), default=0)
+    return np.stack([column[:steps] for column in columns], axis=1) if steps else None
 
 
 def _respond(

@@ -178,6 +178,12 @@ class Stability:
         poses = {case.pose for case in self.cases}
         alone = " (other poses may have less)" if len(poses) > 1 else ""
         yield f"margin at {self.worst.pose}{alone}: {', '.join(self._margins())}"
+        full = dict.fromkeys(case.pose for case in self.cases if case.saturated)
+        if full:
+            yield (
+                f"at {', '.join(full)} motors are at their limit, and are judged as if they stayed "
+                "there: the hand moves the bare device, until it takes them off their limit"
+            )
         if self.margin.alone:
             yield (
                 f"at {self.worst.pose} the mechanism leaves its pose by itself: without hand and "

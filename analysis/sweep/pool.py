@@ -16,7 +16,8 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from contextvars import ContextVar
 from multiprocessing import util
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.process import BaseProcess
@@ -53,7 +54,9 @@ def _run_in_processes(
 ) -> Generator[Done, None, list[Batch]]:
     """Runs jobs from `queue` until it is empty; if a process dies, returns those in progress."""
     in_progress: dict[Future[Sequence[Row]], Batch] = {}
-    with _executor(min(count, len(queue))) as pool:
+    with ExitStack() as own:
+        processes = _kept.get() or own.enter_context(_Processes())
+        pool = processes.start(count)
         while queue or in_progress:
             try:
                 while queue and len(in_progress) < count:
@@ -66,6 +69,7 @@ def _run_in_processes(
                     rows = future.result()
                     yield from zip(in_progress.pop(future), rows, strict=True)
             except BrokenProcessPool:
+                processes.end()
                 return list(in_progress.values())
     return []
 
@@ -90,6 +94,36 @@ class _Worker(SpawnProcess):
             super().run()
         process.freeze_gc()
         process.leave_threads(0)
+
+
+class _Processes(ExitStack):
+    """A pool of processes, each started when there is a job for it."""
+
+    _pool: ProcessPoolExecutor | None = None
+
+    def start(self, count: int) -> ProcessPoolExecutor:
+        """The pool, of `count` processes where there is none yet."""
+        self._pool = self._pool or self.enter_context(_executor(count))
+        return self._pool
+
+    def end(self) -> None:
+        self._pool = None
+        self.close()
+
+
+_kept: ContextVar[_Processes | None] = ContextVar("_kept", default=None)
+
+
+@contextmanager
+def keep_processes() -> Iterator[None]:
+    """Context in which calls of `in_processes` share their processes, which take half a second to
+    start: for rounds of a few jobs."""
+    with _Processes() as processes:
+        before = _kept.set(processes)
+        try:
+            yield
+        finally:
+            _kept.reset(before)
 
 
 @contextmanager

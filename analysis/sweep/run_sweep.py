@@ -204,6 +204,19 @@ def tabulate(
     return made
 
 
+def batches_of(jobs: Sequence[Job], processes: int) -> list[Sequence[Job]]:
+    """The jobs by up to MOST, those together whose clocks are set alike, since runs side by side
+    share their events."""
+    ordered = sorted(jobs, key=_describe_clocks)
+    size = max(1, min(MOST, len(jobs) // (4 * processes)))
+    return [ordered[i : i + size] for i in range(0, len(jobs), size)]
+
+
+def _describe_clocks(job: Job) -> str:
+    scene = job.scene
+    return repr(scene and (scene.haptics, scene.graphics, scene.duration, scene.start_time))
+
+
 def _finished(
     jobs: Sequence[Job],
     folder: Path,
@@ -223,8 +236,7 @@ def _finished(
     interrupt.add(clear)
     try:
         of_batch = partial(work_together, folder=running, judge=judge, together=together)
-        size = max(1, min(MOST, len(jobs) // (4 * processes))) if together else 1
-        batches = [jobs[i : i + size] for i in range(0, len(jobs), size)]
+        batches = batches_of(jobs, processes) if together else [[job] for job in jobs]
         yield from pool.in_processes(of_batch, batches, processes)
     finally:
         interrupt.remove(clear)

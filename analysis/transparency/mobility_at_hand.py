@@ -30,7 +30,7 @@ import numpy as np
 from hapticlink.analysis.findings.noticed import DIRECTION, FORCE
 from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.hand_cases import Case, InHands
-from hapticlink.analysis.stability.hands import FREE, HANDS, free
+from hapticlink.analysis.stability.hands import FREE, free, hands_in
 from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, fault_of, simulate_scene
@@ -45,7 +45,7 @@ from hapticlink.components.dynamics.rendered_directions import (
     rendered_directions,
 )
 from hapticlink.components.linkage.parameters import mean_link_length
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
@@ -102,6 +102,7 @@ class Transparency:
     pose: str
     free: tuple[Direction, ...]
     constrained: tuple[Constraint, ...]
+    space: PortSpace = PLANE
     growing: tuple[Case, ...] = ()
     steady_in: tuple[str, ...] = ()
     stand_ins: tuple[StandIn, ...] = ()
@@ -132,14 +133,15 @@ class Transparency:
             if felt.real < 0.0:  # pressed against something
                 inert = f"a spring of {short(-felt.real * w * w)} N/m"
             turned = f", turned by {short(float(at_slow(d.angle)))} degrees" * (felt.real > 0.0)
+            along = _name_direction(self.space, d.along)
             yield (
-                f"  along {_name_direction(d.along)} a mechanism of {short(d.inertia)} kg is felt "
-                f"as {inert} and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
+                f"  along {along} a mechanism of {short(d.inertia)} kg is felt as {inert} "
+                f"and {short(-w * felt.imag)} N.s/m at {SLOW:g} Hz{turned}; right "
                 f"up to {_hertz(d.right_up_to)}"
             )
         for c in self.constrained:
             stiff = "rigid" if np.isinf(c.slow) else f"{short(c.slow)} N/m at {SLOW:g} Hz"
-            yield f"  against {_name_direction(c.along)}, which is constrained: {stiff}"
+            yield f"  against {_name_direction(self.space, c.along)}, which is constrained: {stiff}"
         if self.constrained and self.free:
             yield (
                 f"  Z-width (constrained over free impedance at {SLOW:g} Hz): {_width(self.width)}"
@@ -218,11 +220,11 @@ def _visit_poses(read: Scene, count: int) -> list[Pose]:
 def _measure_felt(read: Scene, place: RestingScene, name: str, scales: Scales) -> Transparency:
     cut = response(place.period(scales), hand_port(place.map.system))
     X = np.array([cut.compliance(hertz, place.T) for hertz in HERTZ])
-    rendered = rendered_directions(read.device.handle if read.device else None)
+    rendered = rendered_directions(read.device.handle if read.device else None, read.space)
     length = mean_link_length(_linkage(read))
     found = of(read.title, name, X, mobility(place), length, rendered)
     judged = InHands(place, scales)
-    cases = judged.cases(name, {FREE: free(), **HANDS}, DRIFT)
+    cases = judged.cases(name, {FREE: free(), **hands_in(read.space)}, DRIFT)
     growing = tuple(case for case in cases if _grows(case))
     steady = tuple(case.hand for case in cases if not (case.free or case in growing))
     stand_ins = find_stand_ins(place.map.work.responses)
@@ -244,7 +246,7 @@ def of(
     """The transparency of a handle with the compliances X (k, 3, 3) at HERTZ, for a mechanism of a
     mobility Lambda^-1 (3, 3) with links of a mean length (m), in the directions that a device
     renders."""
-    S, w = np.diag(np.array(PLANE.scaling(length), float)), 2 * np.pi * HERTZ
+    S, w = np.diag(np.array(rendered.space.scaling(length), float)), 2 * np.pi * HERTZ
     felt = np.array(rendered.rows)
     values, vectors = np.linalg.eigh(felt @ S @ rendered.felt_mobility(mobility) @ S @ felt.T)
     moves, vectors = values > CONSTRAINED * values[-1], felt.T @ vectors
@@ -258,7 +260,7 @@ def of(
     gives = [np.abs(np.einsum("i,kij,j->k", p, X, p)) for p in P]
     stiff = [np.where(x * RIGID > 1.0, 1.0 / np.maximum(x, 1e-300), np.inf) for x in gives]
     constrained = [Constraint(p, k) for p, k in zip(P, stiff, strict=True)]
-    return Transparency(title, pose, tuple(free), tuple(constrained))
+    return Transparency(title, pose, tuple(free), tuple(constrained), rendered.space)
 
 
 def _direction(along: Vector, column: Complex, i: int, inertia: float) -> Direction:
@@ -400,6 +402,10 @@ def _hertz(frequency: float) -> str:
     return f"{short(frequency)} Hz" if frequency else f"less than {HERTZ[0]:g} Hz"
 
 
-def _name_direction(along: Vector) -> str:
-    x, y, turn = along if along[int(np.argmax(np.abs(along)))] > 0 else -along
-    return f"({x:.2f}, {y:.2f}; {turn:.2f})"
+def _name_direction(space: PortSpace, along: Vector) -> str:
+    """Its lengths, and after these what is about an axis."""
+    forward = along if along[int(np.argmax(np.abs(along)))] > 0 else -along
+    parts = np.split(forward, [space.lengths])
+    return (
+        f"({'; '.join(', '.join(f'{entry:.2f}' for entry in part) for part in parts if len(part))})"
+    )

@@ -17,12 +17,10 @@ from hapticlink.analysis.search.settings import Scales
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.components.dynamics.rendered_directions import WHOLE, RenderedDirections
 from hapticlink.components.linkage.parameters import mean_link_length
-from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import (
-    ENVIRONMENT_WRENCH,
     MOBILITIES,
 )
 
@@ -35,10 +33,10 @@ CONSTRAINED = 1e-6
 
 
 def mobility(place: RestingScene) -> Matrix:
-    """Lambda^-1 (3, 3) at an equilibrium. Raises InputFault where no FMU puts it out."""
+    """Lambda^-1 (m, m) at an equilibrium. Raises InputFault where no FMU puts it out."""
     for port in MOBILITIES:
-        if len(values := place.signal(port)) == PLANE.size**2:
-            return values.reshape(PLANE.mobility.shape)
+        if len(values := place.signal(port)) == place.space.size**2:
+            return values.reshape(place.space.mobility.shape)
     raise InputFault(f"no FMU puts out the mobility of the mechanism ({' or '.join(MOBILITIES)})")
 
 
@@ -62,11 +60,10 @@ class Feel:
         vectors = felt.T @ vectors
         null = [S @ vectors[:, i] for i in np.flatnonzero(values < CONSTRAINED * values[-1])]
         if null:
-            n = max(null, key=lambda wrench: float(PLANE.distance(wrench)))
-            found["constraint"] = n / PLANE.distance(n)
-        F = place.signal(ENVIRONMENT_WRENCH)
-        F = F if rendered.whole or not len(F) else felt.T @ (felt @ F)
-        if len(F) and (size := float(PLANE.distance(F))):
+            n = max(null, key=lambda wrench: float(linkage.space.distance(wrench)))
+            found["constraint"] = n / linkage.space.distance(n)
+        F = place.contact if rendered.whole else felt.T @ (felt @ place.contact)
+        if size := float(linkage.space.distance(F)):
             found["contact"] = F / size
         if not found:
             raise InputFault(

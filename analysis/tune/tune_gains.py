@@ -108,7 +108,7 @@ class _Tuning:
         self._read, self._margin, self._tell, self._keep = read, margin, tell, keep
         self._linkage, device = required(read)
         self._limits = AcceptanceLimits.of(device)
-        self._rendered = rendered_directions(device.handle)
+        self._rendered = rendered_directions(device.handle, device.space)
 
     def search(self) -> Scales:
         """The scales of the largest gains with which margin and run hold, with frames of whole

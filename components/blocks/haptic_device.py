@@ -2,11 +2,11 @@
 
     M_d(x) v' + C_d(x, v) v = J_q' (tau + friction) + E F_hand + stops        (4.5)
 
-in the directions E of the handle in which the device moves; x, v and all wrenches are of the plane,
-and 0 in the others (x: as at the start). tau, the torques of least norm for F_motor at the pose
-measured at t_k, saturated, is held over the communication step [t_k, t_k + h). A device without
-friction has no terms of it. At t = 0 the handle is at rest at x_start and the observed force is
-zero.
+in the directions E of the handle in which the device moves; x, v and all wrenches are those of the
+port, of the plane or of a point in space, and 0 in the others (x: as at the start). tau, the
+torques of least norm for F_motor at the pose measured at t_k, saturated, is held over the
+communication step [t_k, t_k + h). A device without friction has no terms of it. At t = 0 the handle
+is at rest at x_start and the observed force is zero.
 
 Without encoders x and v are the true values. With them x is the pose that belongs to the quantised
 angles; v and F_hand_observed come from the observer. M and c = C_d v are evaluated at the measured
@@ -30,35 +30,41 @@ from hapticlink.components.device import observer_laws, variables
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.models import device_model
 from hapticlink.components.device.motors_and_encoders import count
-from hapticlink.components.device.variables import (
-    F_HAND_OBSERVED,
-    X_START,
-    C,
-    M,
-    V,
-    X,
-    in_plane,
-)
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.device.variables import in_port, seen, start_pose
+from hapticlink.components.port_space import PortSpace
 from hapticlink.components.ports import Power
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.device import Device
 
-SPACE = PLANE
-"""Of the port at the handle."""
-_POWER = Power("x_true")
-_F_MOTOR = Variable("F_motor", *SPACE.wrench, 0.0, "desired wrench of the motors", power=_POWER)
-_F_HAND = Variable("F_hand", *SPACE.wrench, 0.0, "wrench of the hand on the handle", power=_POWER)
-_TRUE_OUTPUTS = [
-    Variable("workspace_margin", (), "m", 0.0, "smallest distance to a stop, negative beyond it"),
-    Variable("x_true", *SPACE.pose, description="true pose of the handle"),
-    Variable("v_true", *SPACE.twist, 0.0, "true velocity of the handle", derivative_of="x_true"),
-]
 FRICTION = ("motor_damping", "motor_friction")
 
 
+def _wrench(space: PortSpace, name: str, text: str) -> Variable:
+    return Variable(name, *space.wrench, 0.0, text, power=Power("x_true"))
+
+
+def _of_motors(space: PortSpace) -> Variable:
+    return _wrench(space, "F_motor", "desired wrench of the motors")
+
+
+def _of_hand(space: PortSpace) -> Variable:
+    return _wrench(space, "F_hand", "wrench of the hand on the handle")
+
+
+def _true_outputs(space: PortSpace) -> list[Variable]:
+    margin, velocity = (
+        "smallest distance to a stop, negative beyond it",
+        "true velocity of the handle",
+    )
+    return [
+        Variable("workspace_margin", (), "m", 0.0, margin),
+        Variable("x_true", *space.pose, description="true pose of the handle"),
+        Variable("v_true", *space.twist, 0.0, velocity, derivative_of="x_true"),
+    ]
+
+
 class _Motion:
-    """The names of the states of the motion: x_true and v_true where these are all of the plane."""
+    """The names of the states of the motion: x_true and v_true where these are all of the port."""
 
     def __init__(self, model: DeviceModel) -> None:
         whole = model.is_pose and model.directions.whole
@@ -91,13 +97,13 @@ def _resolutions(model: DeviceModel) -> Variable:
 
 def _parameters(model: DeviceModel, *, torque_limit: bool = True) -> list[Variable]:
     limits = [v for v in model.limits if torque_limit or v.name != "torque_limit"]
-    return [X_START, *model.parameters, *limits]
+    return [start_pose(model.device.space), *model.parameters, *limits]
 
 
 def _plant(block: Block, model: DeviceModel) -> ca.Function:
     """(x = [place, v], u = [tau, F_hand], p, t) -> x' of (4.5)."""
     n, k, m = len(model.start_place), model.directions.size, len(model.motors)
-    state, drive = ca.SX.sym("x", n + k), ca.SX.sym("u", m + SPACE.size)
+    state, drive = ca.SX.sym("x", n + k), ca.SX.sym("u", m + model.device.space.size)
     z, v, tau, F_hand = state[:n], state[n:], drive[:m], model.directions.pick(drive[m:])
     inertia, c = model.motion(z, v, block.p)
     J = model.jacobian(z, block.p)
@@ -198,55 +204,55 @@ def haptic_device(device: Device, encoders: bool = False) -> Component:
 
 def _ideal(model: DeviceModel) -> Component:
     """The device whose pose and velocity are known."""
-    motion = _Motion(model)
+    motion, space = _Motion(model), model.device.space
     block = Block(
-        inputs=[_F_MOTOR, _F_HAND],
+        inputs=[_of_motors(space), _of_hand(space)],
         parameters=_parameters(model),
         states=motion.states,
-        outputs=[X, V, M, C, *_TRUE_OUTPUTS],
+        outputs=[*seen(space, force=False), *_true_outputs(space)],
     )
     z, v = motion.of(block)
     tau = model.motor_torques(model.directions.pick(block.u["F_motor"]), z, block.p)
     inertia, c = model.motion(z, v, block.p)
-    seen = {"x": model.handle(z, block.p), "v": v, "M": inertia, "c": c}
+    known = {"x": model.handle(z, block.p), "v": v, "M": inertia, "c": c}
     parts = [_MOTORS, _motion_part(block, motion), _IDEAL, _MATRICES]
     made = _Made(block, model, motion, "ideally sensed", parts)
-    return made.component({}, made.moved(tau), seen)
+    return made.component({}, made.moved(tau), known)
 
 
 def _with_observer(model: DeviceModel) -> Component:
     """The device with encoders and observer."""
-    motion = _Motion(model)
+    motion, space = _Motion(model), model.device.space
     block = Block(
-        inputs=[_F_MOTOR, _F_HAND],
+        inputs=[_of_motors(space), _of_hand(space)],
         parameters=[
             *_parameters(model),
             _resolutions(model),
             *observer_laws.parameters(model),
         ],
         states=[*motion.states, *observer_laws.states(model)],
-        outputs=[X, V, F_HAND_OBSERVED, M, C, *_TRUE_OUTPUTS],
+        outputs=[*seen(space, force=True), *_true_outputs(space)],
     )
     u, p = block.u, block.p
     observer = observer_laws.observer(model, p)
     now = observer.read(block.x)
-    seen = observer.outputs(now)
+    known = observer.outputs(now)
     tau = model.motor_torques(model.directions.pick(u["F_motor"]), now.place, p)
     parts = [_MOTORS, _motion_part(block, motion), *_observer_parts(block), _MATRICES]
     made = _Made(block, model, motion, "encoders and observer", parts)
     moved, guess = made.moved(tau), model.place_at_pose(p["x_start"], p)
     first = observer.start(made.measured(guess)[0], guess)
     after = observer.advance(now, made.measured(moved[motion.names[0]])[0], tau, block.h)
-    return made.component(first.states, moved | after.states, seen)
+    return made.component(first.states, moved | after.states, known)
 
 
 def _without_observer(model: DeviceModel) -> Component:
     """The device with encoders, whose observer is a block of its own."""
-    motion = _Motion(model)
+    motion, space = _Motion(model), model.device.space
     block = Block(
         inputs=[
             _torques(model, "tau", "torques of the motors", Power("theta_true")),
-            _F_HAND,
+            _of_hand(space),
         ],
         parameters=[*_parameters(model, torque_limit=False), _resolutions(model)],
         states=[*motion.states, _torques(model, "tau_applied", "torques of the step before")],
@@ -256,7 +262,7 @@ def _without_observer(model: DeviceModel) -> Component:
             _torques(model, "tau_applied", "torques of the step that ends"),
             _angles(model, "q_true", "true joint coordinates"),
             Variable("theta_true", (len(model.motors),), "rad", description="true motor angles"),
-            *_TRUE_OUTPUTS,
+            *_true_outputs(space),
         ],
     )
     z, tau = motion.of(block)[0], block.u["tau"]
@@ -297,10 +303,10 @@ class _Made:
         self,
         initial: Mapping[str, ca.SX],
         step: Mapping[str, ca.SX],
-        seen: Mapping[str, ca.SX],
+        known: Mapping[str, ca.SX],
         output: Mapping[str, ca.SX] | None = None,
     ) -> Component:
-        """The device with further initial values and steps of states, what it `seen` along the
+        """The device with further initial values and steps of states, what is `known` along the
         directions that are felt, and further outputs."""
         block, model = self._block, self._model
         p, directions = block.p, model.directions
@@ -318,7 +324,7 @@ class _Made:
             "continuous",
             initial={**at_rest, **initial},
             step=step,
-            output={**in_plane(directions, seen, p["x_start"]), **(output or {}), **true},
+            output={**in_port(directions, known, p["x_start"]), **(output or {}), **true},
             documentation=__doc__ or "",
             parts=self._parts,
         )

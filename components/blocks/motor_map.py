@@ -10,17 +10,17 @@ from __future__ import annotations
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device.models import device_model
-from hapticlink.components.device.variables import X, torque_limit
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.device.variables import measured_pose, torque_limit
 from hapticlink.components.specs.device import Device
 
 
 def motor_map(device: Device) -> Component:
     """The motor map of a device."""
     model = device_model(device)
-    m = (len(model.motors),)
+    space, m = device.space, (len(model.motors),)
+    F_motor = Variable("F_motor", *space.wrench, 0.0, "desired wrench of the motors")
     block = Block(
-        inputs=[Variable("F_motor", *PLANE.wrench, 0.0, "desired wrench of the motors"), X],
+        inputs=[F_motor, measured_pose(space)],
         parameters=[*model.parameters, torque_limit(model)],
         outputs=[Variable("tau", m, "N.m", description="torques of the motors")],
     )

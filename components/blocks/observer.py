@@ -18,11 +18,9 @@ import casadi as ca
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device import observer_laws
 from hapticlink.components.device.models import device_model
-from hapticlink.components.device.variables import F_HAND_OBSERVED, X_START, C, M, V, X, in_plane
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.device.variables import in_port, seen, start_pose
 from hapticlink.components.specs.device import Device
 
-_A = Variable("a", *PLANE.acceleration, description="observed acceleration of the handle")
 _PERIOD = Variable("period", (), "s", description="time since the last sample, 0 before the first")
 
 
@@ -30,15 +28,18 @@ def observer(device: Device) -> Component:
     """The observer of a device, with the gains of its [device.observer]."""
     model = device_model(device)
     units = tuple(sensed.joint.kind.units[0] for sensed in model.encoders)
-    m = (len(model.motors),)
+    m, space = (len(model.motors),), device.space
+    pose, velocity, *others = seen(space, force=True)
+    text = "observed acceleration of the handle"
+    acceleration = Variable("a", *space.acceleration, description=text)
     block = Block(
         inputs=[
             Variable("q", (len(units),), units, description="measured joint coordinates"),
             Variable("tau", m, "N.m", description="torques of the motors until now"),
         ],
-        parameters=[X_START, *model.parameters, *observer_laws.parameters(model)],
+        parameters=[start_pose(space), *model.parameters, *observer_laws.parameters(model)],
         states=[*observer_laws.states(model), _PERIOD],
-        outputs=[X, V, _A, F_HAND_OBSERVED, M, C],
+        outputs=[pose, velocity, acceleration, *others],
     )
     x, u, p = block.x, block.u, block.p
     law = observer_laws.observer(model, p)
@@ -47,13 +48,13 @@ def observer(device: Device) -> Component:
     # The first output advances the start by a period of 0.
     first = law.start(u["q"], guess).unsampled(guess)
     initial = first.states | {"period": ca.SX(0)}
-    seen = law.outputs(now) | {"a": law.acceleration(now, u["tau"])}
+    estimate = law.outputs(now) | {"a": law.acceleration(now, u["tau"])}
     return block.component(
         "observer",
         "Observer of a device's handle and of the hand's wrench on it",
         "sampled",
         initial=initial,
         step=now.states | {"period": block.h},
-        output=in_plane(model.directions, seen, p["x_start"]),
+        output=in_port(model.directions, estimate, p["x_start"]),
         documentation=__doc__ or "",
     )

@@ -44,7 +44,8 @@ class DeviceModel(ABC):
     assembled near its `start`, or that does not move in the k directions alone."""
 
     def __init__(self, device: Device) -> None:
-        self.device, self.directions = device, rendered_directions(device.handle)
+        self.device = device
+        self.directions = rendered_directions(device.handle, device.space)
         self.motors, self.encoders = device.motors, device.encoders
         self.start = self._assembled()
         x_h = ca.Function("x_h", [self._model.q, self._model.p.vector], [self._model.x_h])
@@ -81,6 +82,10 @@ class DeviceModel(ABC):
         """World frame of every body."""
 
     @abstractmethod
+    def joint_coordinates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
+        """Angles (rad) and displacements (m) of joints."""
+
+    @abstractmethod
     def joint_rates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
         """The Jacobian of joint coordinates by y."""
 
@@ -113,21 +118,6 @@ class DeviceModel(ABC):
         z, p = self.place_at_pose(pose), self.numbers
         off = ca.norm_2(self.handle(z, p) - self.directions.pick(pose))
         return ca.if_else(off < REACHED, ca.mmin(self.margins(z, p)), -off)
-
-    def joint_coordinates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
-        """Angles (rad) and displacements (m) of joints."""
-        frames = self.frames(z, p)
-        found = []
-        for j in joints:
-            parent, child = frames[j.parent], frames[j.child]
-            if j.type == "revolute":
-                found.append(child.angle - parent.angle)
-                continue
-            axis = p[f"{j.name}.axis"]
-            along = parent.rotation @ ca.vertcat(ca.cos(axis), ca.sin(axis))
-            end, begin = p.get(f"{j.name}.at_child"), p.get(f"{j.name}.at_parent")
-            found.append(ca.dot(along, child.point(end) - parent.point(begin)))
-        return ca.vertcat(*found)
 
     def angles(self, z: ca.SX, p: Parameters) -> ca.SX:
         """q, the coordinates of the joints with encoders, (e,)."""
@@ -213,8 +203,7 @@ class DeviceModel(ABC):
 
     def _way(self, z: ca.SX, p: Parameters, joint: DeviceJoint) -> ca.SX:
         """The least way (m) of the handle for a unit of a joint's coordinate."""
-        lengths = min(self.directions.size, 2)
-        return 1 / ca.norm_2(self.joint_rates(z, p, [joint])[:, :lengths])
+        return 1 / ca.norm_2(self.joint_rates(z, p, [joint])[:, : self.directions.lengths])
 
     @property
     def _ranged(self) -> list[DeviceJoint]:
@@ -302,12 +291,15 @@ class DeviceModel(ABC):
         J = np.array(self.directions.rows) @ J_h
         rank = int(np.linalg.matrix_rank(W, 1e-9)) if len(W) else 0
         free = W.shape[1] - rank
-        handle = self.device.handle
-        ways = f'handle.angle = "{handle.angle}"' + (" and `along`" if handle.along else "")
+        handle, in_plane = self.device.handle, any(self.device.space.turns)
+        ways, remedy = "a point in space", "give it as many joints"
+        if in_plane:
+            ways = f'handle.angle = "{handle.angle}"' + (" and `along`" if handle.along else "")
+            remedy = "give `along` to one of one, a held angle to one of three"
         if free != k or rank < len(W):
             raise ValueError(
                 f"its linkage has {free} degrees of freedom, and {ways} leaves {k} to be felt: "
-                "give `along` to one of one, a held angle to one of three"
+                f"{remedy}"
             )
         if np.linalg.matrix_rank(np.vstack([W, J]), 1e-6) < len(self.start):
             raise ValueError(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from hapticlink.components.linkage.parameters import loop_name
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.quantities import Point
+from hapticlink.components.specs.quantities import Place
 
 GROUND = "ground"
 
@@ -52,7 +52,7 @@ class Pins:
     """The pins of a device: the places of all bodies that each joins."""
 
     def __init__(self, device: Device) -> None:
-        self._positions: dict[PinPlace, Point] = {}
+        self._positions: dict[PinPlace, Place] = {}
         self.handle = PinPlace(device.handle.body, "operational_point.at")
         pairs = [[(self.handle, device.handle.at)]]
         for j in device.placed:
@@ -79,8 +79,9 @@ class Pins:
 
 def dyads(device: Device) -> list[Dyad] | None:
     """The dyads of a device in the order in which they are solved; None where they do not reach
-    every body."""
-    if device.handle.along or any(joint.type != "revolute" for joint in device.placed):
+    every body, and of a device in space."""
+    planar = device.linkage.dimension == 2
+    if not planar or device.handle.along or any(j.type != "revolute" for j in device.placed):
         return None
     pins = Pins(device)
     held = device.handle.angle == "held"

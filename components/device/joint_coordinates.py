@@ -64,6 +64,9 @@ class JointCoordinates(DeviceModel):
     def frames(self, z: ca.SX, p: Parameters) -> Mapping[str, Frame]:
         return self._at(z, p).frames
 
+    def joint_coordinates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
+        return ca.vertcat(*(z[self._model.coordinate(j.name)] for j in joints))
+
     def joint_rates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
         B = self._rates(z, p)
         return ca.vertcat(*(B[self._model.coordinate(j.name), :] for j in joints))

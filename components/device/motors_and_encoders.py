@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.models import device_model
+from hapticlink.components.evaluate_rows import evaluate_rows
 from hapticlink.components.specs.device import Device
 
 Field = NDArray[np.float64]
@@ -37,19 +38,18 @@ def _quantised(value: ca.SX, quantum: ca.SX, share: float) -> tuple[ca.SX, ca.SX
 
 @cache
 def torque_function(device: Device) -> ca.Function:
-    """Torques (N.m), (m,), of a wrench (N, N, N.m) at a pose (m, m, rad) of the handle, both (3,),
-    as the device's motors give them: of least norm, and limited."""
-    model = device_model(device)
-    wrench, pose = ca.SX.sym("wrench", 3), ca.SX.sym("pose", 3)
+    """Torques (N.m), (m,), of a wrench at a pose of the handle, as the device's motors give them:
+    of least norm, and limited."""
+    model, size = device_model(device), device.space.size
+    wrench, pose = ca.SX.sym("wrench", size), ca.SX.sym("pose", size)
     z = model.place_at_pose(pose)
     tau = model.motor_torques(model.directions.pick(wrench), z, model.numbers)
     return ca.Function("torques", [wrench, pose], [tau], {"cse": True})
 
 
 def motor_torques(device: Device, wrenches: Field, poses: Field) -> Field:
-    """`torque_function` of wrenches and poses, both (k, 3): (k, m)."""
-    torques = torque_function(device).map(len(wrenches))
-    return np.asarray(torques(wrenches.T, poses.T)).T
+    """`torque_function` of wrenches and poses, a row each: (k, m)."""
+    return evaluate_rows(torque_function(device), wrenches, poses)
 
 
 def torque_shares(device: Device, torques: Field) -> Field:
@@ -63,7 +63,7 @@ def mass_and_count(model: DeviceModel) -> tuple[float, float]:
     """Mass (kg) at the handle and way (m) of it by a count, means over the lengths that are felt,
     where the device is assembled."""
     z, p = ca.SX.sym("z", len(model.start_place)), model.numbers
-    lengths = min(model.directions.size, 2)
+    lengths = model.directions.lengths
     J = model.angle_rates(z, p)
     counts = ca.diag(ca.DM([1 / sensed.resolution for sensed in model.encoders])) @ J
     M, _ = model.motion(z, ca.SX(model.directions.size, 1), p)
@@ -75,8 +75,8 @@ def mass_and_count(model: DeviceModel) -> tuple[float, float]:
 
 def count_energies(device: Device, pose: Field, period_s: float) -> Field:
     """The kinetic energies (J), (e,), v' M v/2 with v = (J' J)^-1 J' e_i delta/T, of a handle at
-    the pose (m, m, rad) whose measured pose moves by one count delta of encoder i in a period T."""
-    model, x = device_model(device), ca.SX.sym("x", 3)
+    the pose whose measured pose moves by one count delta of encoder i in a period T."""
+    model, x = device_model(device), ca.SX.sym("x", device.space.size)
     z, p = model.place_at_pose(x), model.numbers
     J = model.angle_rates(z, p)
     resolutions = ca.DM([sensed.resolution for sensed in model.encoders])

@@ -33,7 +33,6 @@ from hapticlink.components.device.groups import Anchor, Dyad, PinPlace
 from hapticlink.components.linkage.frame import Frame
 from hapticlink.components.linkage.poses import poses
 from hapticlink.components.linkage.rotations import Z_AXIS
-from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device, DeviceJoint
 
 PAST_STOPS = 0.5
@@ -101,7 +100,7 @@ class PoseCoordinates(DeviceModel):
         super().__init__(device)
         self._dyads = dyads
         k = self.directions.size
-        self.place = (k,), PLANE.pose.units[:k]
+        self.place = (k,), device.space.pose.units[:k]
         self._frames0 = {
             name: values[0] for name, values in poses(device.linkage, [self.start.tolist()]).items()
         }
@@ -123,6 +122,10 @@ class PoseCoordinates(DeviceModel):
 
     def frames(self, z: ca.SX, p: Parameters) -> Mapping[str, Frame]:
         return {name: body.frame for name, body in self._placed(z, p)[0].items()}
+
+    def joint_coordinates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
+        frames = self.frames(z, p)
+        return ca.vertcat(*(frames[j.child].angle - frames[j.parent].angle for j in joints))
 
     def joint_rates(self, z: ca.SX, p: Parameters, joints: Sequence[DeviceJoint]) -> ca.SX:
         bodies, _ = self._placed(z, p)

@@ -1,5 +1,5 @@
-"""Variables that blocks of the device share: what the observer puts out, and where a device
-starts."""
+"""Variables that blocks of a device share, in the space of its port: what the observer puts out,
+and where a device starts."""
 
 from __future__ import annotations
 
@@ -10,17 +10,29 @@ import casadi as ca
 from hapticlink.components.component import Variable
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.dynamics.rendered_directions import RenderedDirections
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PortSpace
 
-X = Variable("x", *PLANE.pose, description="measured pose of the handle")
-V = Variable("v", *PLANE.twist, description="measured velocity of the handle", derivative_of="x")
-F_HAND_OBSERVED = Variable(
-    "F_hand_observed", *PLANE.wrench, description="observed wrench of the hand"
-)
-M = Variable("M", *PLANE.inertia, 0.0, "inertia of the device at the handle", kind="semidefinite")
-C = Variable("c", *PLANE.wrench, description="C_d v, Coriolis and centrifugal terms at the handle")
 
-X_START = Variable("x_start", *PLANE.pose, 0.0, "pose of the handle at the start", "fixed")
+def measured_pose(space: PortSpace) -> Variable:
+    return Variable("x", *space.pose, description="measured pose of the handle")
+
+
+def seen(space: PortSpace, *, force: bool) -> tuple[Variable, ...]:
+    """What is known of the handle, with the observed force of the hand or without one."""
+    velocity, coriolis = "measured velocity of the handle", "C_d v, Coriolis and centrifugal terms"
+    hand = Variable("F_hand_observed", *space.wrench, description="observed wrench of the hand")
+    inertia = "inertia of the device at the handle"
+    return (
+        measured_pose(space),
+        Variable("v", *space.twist, description=velocity, derivative_of="x"),
+        *([hand] if force else []),
+        Variable("M", *space.inertia, 0.0, inertia, kind="semidefinite"),
+        Variable("c", *space.wrench, description=f"{coriolis} at the handle"),
+    )
+
+
+def start_pose(space: PortSpace) -> Variable:
+    return Variable("x_start", *space.pose, 0.0, "pose of the handle at the start", "fixed")
 
 
 def place(model: DeviceModel, name: str, text: str) -> Variable:
@@ -31,19 +43,19 @@ def place(model: DeviceModel, name: str, text: str) -> Variable:
 def way(model: DeviceModel, name: str, text: str) -> Variable:
     """A state that is a pose in the directions that are felt."""
     k = model.directions.size
-    return Variable(name, (k,), PLANE.pose.units[:k], description=text)
+    return Variable(name, (k,), model.device.space.pose.units[:k], description=text)
 
 
 def rate(model: DeviceModel, name: str, text: str) -> Variable:
     """A state that is a velocity in the directions that are felt."""
     k = model.directions.size
-    return Variable(name, (k,), PLANE.twist.units[:k], description=text)
+    return Variable(name, (k,), model.device.space.twist.units[:k], description=text)
 
 
 def force(model: DeviceModel, name: str, text: str) -> Variable:
     """A state that is a force along the directions that are felt."""
     k = model.directions.size
-    return Variable(name, (k,), PLANE.wrench.units[:k], description=text)
+    return Variable(name, (k,), model.device.space.wrench.units[:k], description=text)
 
 
 def torque_limit(model: DeviceModel) -> Variable:
@@ -51,10 +63,10 @@ def torque_limit(model: DeviceModel) -> Variable:
     return next(v for v in model.limits if v.name == "torque_limit")
 
 
-def in_plane(
+def in_port(
     directions: RenderedDirections, along: Mapping[str, ca.SX], x_start: ca.SX
 ) -> dict[str, ca.SX]:
-    """What is known along the directions that are felt as entries of the plane: a pose x keeps the
+    """What is known along the directions that are felt as entries of the port: a pose x keeps the
     rest of x_start, all else is 0 there."""
 
     def whole(name: str, value: ca.SX) -> ca.SX:

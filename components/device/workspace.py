@@ -11,10 +11,12 @@ from typing import Any
 import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label
 
 from hapticlink.components.device.models import device_model
+from hapticlink.components.evaluate_rows import evaluate_rows
+from hapticlink.components.linkage.parameters import distance
 from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.quantities import Place
 
 Field = NDArray[np.float64]
 POINTS, ANGLES = 81, 48
@@ -24,13 +26,7 @@ Range = tuple[float, float]
 def margin(device: Device, poses: Field) -> Field:
     """Smallest distance (m) of the device to its stops, shape (n,), at poses (x m, y m, theta rad)
     of shape (n, 3); negative outside the workspace."""
-    given, margins = np.ascontiguousarray(poses, float), np.zeros(len(poses))
-    buffer: Any
-    # A plain call takes ten times as long.
-    buffer, evaluate = _margin_function(device).map(len(poses)).buffer()
-    buffer.set_arg(0, given.data)
-    buffer.set_res(0, margins.data)
-    evaluate()
+    margins = evaluate_rows(_margin_function(device), poses)[:, 0]
     return np.where(np.isfinite(margins), margins, -np.inf)
 
 
@@ -42,11 +38,11 @@ def _margin_function(device: Device) -> ca.Function:
 
 @cache
 def line_function(device: Device) -> ca.Function:
-    """The lines of `lines`, (2, points), end to end, as a function of the pose, (3,)."""
+    """The lines of `lines`, (d, points), end to end, as a function of the pose, (3,)."""
     model, pose = device_model(device), ca.SX.sym("pose", 3)
     frames = model.frames(model.place_at_pose(pose), model.numbers)
     points = [
-        frames[body].point(None if at is None else ca.SX(ca.DM(at)))
+        frames[body].point(None if at is None else _local(device, at))
         for line in drawn_lines(device)
         for body, at in line
     ]
@@ -71,26 +67,30 @@ def drawn_lines(device: Device) -> tuple[tuple[tuple[str, Any], ...], ...]:
     return tuple(line for line in lines if len(line) > 1)
 
 
+def _local(device: Device, at: Place) -> ca.SX:
+    """A point of a body with as many numbers as the device has dimensions."""
+    return ca.SX(ca.DM([*at, 0.0][: device.linkage.dimension]))
+
+
 def _in_order(points: list[Any]) -> list[Any]:
     """Points of a body along it: from one of the two farthest ones on."""
-    far = max(points, key=lambda p: max(math.dist(p, q) for q in points))
-    return sorted(points, key=lambda p: math.dist(p, far))
+    far = max(points, key=lambda p: max(distance(p, q) for q in points))
+    return sorted(points, key=lambda p: distance(p, far))
 
 
 def lines(device: Device, pose: Sequence[float]) -> list[Field]:
-    """The device at a pose as lines of points (x, y m), each (points, 2)."""
+    """The device at a pose as lines of points (m), each (points, d)."""
     points = np.asarray(line_function(device)(ca.DM(list(pose)))).T
     ends = np.cumsum([len(line) for line in drawn_lines(device)])
     return np.split(points, ends[:-1])
 
 
 def motor_points(device: Device, pose: Sequence[float]) -> Field:
-    """Where the motors are (x, y m) at a pose, (m, 2)."""
+    """Where the motors are (m) at a pose, (m, d)."""
     model, at = device_model(device), ca.SX.sym("pose", 3)
-    p = model.numbers
-    frames = model.frames(model.place_at_pose(at), p)
+    frames = model.frames(model.place_at_pose(at), model.numbers)
     joints = [motor.joint for motor in model.motors]
-    points = [frames[j.parent].point(p.get(f"{j.name}.at_parent")) for j in joints]
+    points = [frames[j.parent].point(_local(device, j.at_parent or (0.0, 0.0))) for j in joints]
     found = ca.Function("motors", [at], [ca.horzcat(*points)])(ca.DM(list(pose)))
     return np.asarray(found).T
 
@@ -158,6 +158,8 @@ def _around(side: Field, inside: Any) -> Field:
 
 
 def _on_grid(device: Device, x: Field, y: Field, theta: Field) -> Workspace:
+    from scipy.ndimage import label  # slow to load
+
     poses = np.stack(np.meshgrid(x, y, theta, indexing="ij"), axis=-1)
     margins = margin(device, poses.reshape(-1, 3)).reshape(poses.shape[:3])
     start = device_model(device).start_pose
@@ -177,7 +179,7 @@ def _reach(device: Device) -> tuple[Field, float]:
     reach = 0.0
     while True:
         joint = above[body]
-        reach += math.dist(point or (0.0, 0.0), joint.at_child or (0.0, 0.0))
+        reach += distance(point or (0.0, 0.0), joint.at_child or (0.0, 0.0))
         if joint.type == "prismatic":
             reach += max(map(abs, joint.range or (0.0,)))
         body, point = joint.parent, joint.at_parent
@@ -185,13 +187,16 @@ def _reach(device: Device) -> tuple[Field, float]:
             return np.array(point or (0.0, 0.0)), max(reach, 1e-3)
 
 
-def extent_along(device: Device) -> Range:
-    """The first and the last coordinate (m) along the one way of a device that has one."""
-    model = device_model(device)
-    (way,) = np.array(model.directions.rows)
-    _, reach = _reach(device)
-    grid = np.linspace(-reach, reach, POINTS) + way @ model.start_pose
-    return _ends(grid, margin(device, np.outer(grid, way)))
+def extents_along(device: Device) -> list[Range]:
+    """The first and the last coordinate (m) along each direction that the device renders, the
+    others as at its start."""
+    model, (_, reach) = device_model(device), _reach(device)
+    ways = np.linspace(-reach, reach, POINTS)
+    start, found = model.start_pose, list[Range]()
+    for along in np.array(model.directions.rows):
+        margins = margin(device, start + np.outer(ways, along))
+        found.append(_ends(along @ start + ways, margins))
+    return found
 
 
 def _ends(grid: Field, margin: Field) -> Range:

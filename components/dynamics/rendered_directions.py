@@ -55,6 +55,11 @@ class RenderedDirections:
         return self.size == self.space.size
 
     @property
+    def lengths(self) -> int:
+        """The number of those that are lengths, which are the first."""
+        return self.size - self.has_moments
+
+    @property
     def has_moments(self) -> bool:
         """Whether moments are rendered."""
         return any(

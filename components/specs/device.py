@@ -7,21 +7,24 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Annotated, Literal
+from itertools import zip_longest
+from typing import Annotated, Literal, cast
 
-from hapticlink.components.port_space import PLANE, PortSpace
-from hapticlink.components.specs.bodies import Body
+from hapticlink.components.port_space import PortSpace
+from hapticlink.components.specs.bodies import Body, Inertias, Moments
 from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.joint_types import JOINT_TYPES, JointType
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop, OperationalPoint
 from hapticlink.components.specs.quantities import (
     Angle,
     Coordinate,
+    Direction,
+    Length,
     LinearDamping,
     LinearStiffness,
     Mass,
     MomentOfInertia,
-    Point,
+    Place,
     Quantity,
 )
 
@@ -58,9 +61,9 @@ class DeviceBody:
     """Its name in joints and loops; not "ground"."""
     mass: Mass
     """Mass."""
-    inertia: MomentOfInertia
-    """Moment of inertia about the centre of mass."""
-    center: Point | None = None
+    inertia: MomentOfInertia | Moments | Inertias
+    """Moment of inertia about the centre of mass; in space as that of a body of a linkage."""
+    center: Place | None = None
     """Centre of mass in the body's frame; by default its origin."""
 
 
@@ -100,12 +103,13 @@ class DeviceJoint:
     """The body that carries the joint."""
     child: str
     """The body that the joint carries."""
-    at_parent: Point | None = None
+    at_parent: Place | None = None
     """Position of the joint in the parent's frame; by default its origin."""
-    at_child: Point | None = None
+    at_child: Place | None = None
     """Position of the joint in the child's frame; by default its origin."""
-    axis: Angle | None = None
-    """Direction of a prismatic joint in the parent's frame, from its x axis; required there."""
+    axis: Angle | Direction | None = None
+    """Direction of a prismatic joint in the parent's frame, from its x axis; required there. In
+    space the axis of any joint, three numbers in the parent's frame; by default its z axis."""
     motor: Motor | bool = False
     """Its motor; true for that of [device.motor]."""
     encoder: Encoder | bool = False
@@ -121,12 +125,16 @@ class DeviceJoint:
 
 @dataclass(frozen=True, kw_only=True)
 class DeviceLoop:
-    """A pin that closes a loop between two bodies of a device."""
+    """What closes a loop between two bodies of a device."""
 
+    type: Literal["revolute", "rod"] = "revolute"
+    """revolute: a pin; rod: a link without mass between two balls, of devices in space."""
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
-    at: tuple[Point, Point]
+    at: tuple[Place, Place]
     """The two points, each in the frame of its body."""
+    length: Length | None = None
+    """Distance of the two points that a rod holds; required there."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,11 +143,12 @@ class Handle:
 
     body: str
     """The body that it belongs to."""
-    at: Point | None = None
+    at: Place | None = None
     """Its position in the body's frame; by default its origin."""
     angle: Literal["held", "free", "fixed"] = "held"
     """held: the handle turns with its body, and moments are rendered; free: a point, whose angle
-    belongs to nobody; fixed: the device does not let it turn, as a stage."""
+    belongs to nobody; fixed: the device does not let it turn, as a stage. In space the handle is a
+    point, and three forces are rendered: leave it out."""
     along: tuple[Annotated[float, Quantity("1")], Annotated[float, Quantity("1")]] | None = None
     """Direction in the world of the one way of a device with one degree of freedom; by default x
     and y are felt."""
@@ -162,6 +171,29 @@ class Stops:
     """Stiffness."""
     damping: LinearDamping = 20.0
     """Damping."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NumberOrigins:
+    """Where the numbers of a device are from: each text begins with `printed`, `measured` or
+    `assumed`, and says by whom."""
+
+    lengths: str = ""
+    """Of lengths and places of joints."""
+    masses: str = ""
+    """Of masses, centres and moments of inertia of bodies."""
+    motors: str = ""
+    """Of limits, ratios, inertias and friction of motors."""
+    encoders: str = ""
+    """Of resolutions of encoders."""
+
+    def __post_init__(self) -> None:
+        for key, text in vars(self).items():
+            if text and not text.startswith(_ORIGINS):
+                raise ValueError(f"{key} = {text!r} begins with none of {', '.join(_ORIGINS)}")
+
+
+_ORIGINS = ("printed", "measured", "assumed")
 
 
 @dataclass(frozen=True)
@@ -192,16 +224,18 @@ class Device:
     title: str = ""
     """What the device is, in a few words."""
     description: str = ""
+    """What else there is to say of it."""
+    origin: NumberOrigins = field(default_factory=NumberOrigins)
     """Where its numbers are from."""
     body: tuple[DeviceBody, ...]
     """The bodies."""
     joint: tuple[DeviceJoint, ...]
     """The joints of the tree: every body is the child of exactly one."""
     loop: tuple[DeviceLoop, ...] = ()
-    """The pins that close loops."""
+    """What closes loops."""
     handle: Handle
     """What the hand holds."""
-    base: Point = (0.0, 0.0)
+    base: Place = (0.0, 0.0)
     """Where the origin of the device's own frame stands in the world."""
     start: Mapping[str, Coordinate] = field(default_factory=dict)
     """Joint coordinates by the joint's name near which its loops are assembled, by default 0: they
@@ -248,17 +282,17 @@ class Device:
 
     @cached_property
     def placed_loops(self) -> tuple[DeviceLoop, ...]:
-        """The pins that close loops, likewise."""
+        """What closes loops, likewise."""
 
-        def moved(body: str, at: Point) -> Point:
+        def moved(body: str, at: Place) -> Place:
             return self._in_world(at) if body == "ground" else at
 
         both = ((moved(c.bodies[0], c.at[0]), moved(c.bodies[1], c.at[1])) for c in self.loop)
         return tuple(replace(c, at=at) for c, at in zip(self.loop, both, strict=True))
 
-    def _in_world(self, at: Point | None) -> Point:
-        x, y = at or (0.0, 0.0)
-        return x + self.base[0], y + self.base[1]
+    def _in_world(self, at: Place | None) -> Place:
+        both = zip_longest(at or (0.0, 0.0), self.base, fillvalue=0.0)
+        return cast("Place", tuple(a + b for a, b in both))
 
     @cached_property
     def motors(self) -> tuple[DrivenJoint, ...]:
@@ -293,7 +327,7 @@ class Device:
     @property
     def space(self) -> PortSpace:
         """That of the port at the handle."""
-        return PLANE
+        return self.linkage.space
 
     @cached_property
     def linkage(self) -> Linkage:
@@ -302,7 +336,7 @@ class Device:
         return Linkage(
             body=tuple(Body(**vars(b)) for b in self.body),
             joint=tuple(Joint(**{key: getattr(j, key) for key in keys}) for j in self.placed),
-            loop=tuple(Loop(bodies=c.bodies, at=c.at) for c in self.placed_loops),
+            loop=tuple(Loop(**vars(c)) for c in self.placed_loops),
             operational_point=OperationalPoint(body=self.handle.body, at=self.handle.at),
             start=self.start,
         )

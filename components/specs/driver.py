@@ -24,9 +24,10 @@ class Driver:
     type: Annotated[str, DRIVERS.names()] = "open-kit"
     """The protocol: open-kit, the serial protocol of the open two-motor teaching kit."""
     port: str = ""
-    """The serial port (`/dev/ttyACM0`, `COM3`), or `simulated-board`: a board that is a process of
-    this computer, with the device and the hand of the scene. Without one, or with `none`, the
-    device is simulated. `--device PORT` gives it, too."""
+    """The serial port (`/dev/ttyACM0`, `COM3`), the socket of a board behind a network
+    (`socket://HOST:PORT`), or `simulated-board`: a board that is a process of this computer, with
+    the device and the hand of the scene. Without one, or with `none`, the device is simulated.
+    `--device PORT` gives it, too."""
     counts: tuple[_Count, ...] = ()
     """Counts of each encoder in a turn; by default those of the device's encoders."""
     home: tuple[_Angle, ...] = ()

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Annotated, Any, Literal
 
 from hapticlink.components.integrators import METHODS
@@ -296,7 +297,7 @@ class Linkage:
         point = self.operational_point
         return point if isinstance(point, str) and self.choices else "operational_point"
 
-    @property
+    @cached_property
     def spatial(self) -> str:
         """What makes it one in space: a type of joint, or a vector of more numbers than two; "" in
         the plane."""

@@ -13,6 +13,8 @@ from hapticlink.components.specs.driver import DRIVERS as DRIVERS
 
 SIMULATED_BOARD = "simulated-board"
 """The port of a board that is a process of this computer."""
+SOCKET = "socket://"
+"""What the port of a board behind a socket, `socket://HOST:PORT`, begins with."""
 
 
 class Silent(Exception):

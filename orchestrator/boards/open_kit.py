@@ -22,6 +22,7 @@ from __future__ import annotations
 
 import math
 import os
+import socket
 import struct
 import time
 from collections.abc import Sequence
@@ -29,7 +30,7 @@ from typing import TYPE_CHECKING
 
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.boards.driver import DeviceDriver, Silent, Wiring
+from hapticlink.orchestrator.boards.driver import SOCKET, DeviceDriver, Silent, Wiring
 
 if TYPE_CHECKING:
     from serial import Serial
@@ -79,12 +80,17 @@ class OpenKit(DeviceDriver):
 
     def open(self) -> None:
         try:
-            from serial import Serial, SerialException
+            from serial import SerialException, serial_for_url
         except ModuleNotFoundError:
             remedy = install_command("board")
             raise InputFault(f"{self.port}: serial ports need pyserial: {remedy}") from None
         try:
-            self._serial = Serial(self.port, 115200, timeout=0, write_timeout=0.05)
+            self._serial = serial_for_url(self.port, 115200, timeout=0, write_timeout=0.05)
+            if self.port.startswith(SOCKET):
+                with socket.fromfd(
+                    self._serial.fileno(), socket.AF_INET, socket.SOCK_STREAM
+                ) as end:
+                    end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (SerialException, ValueError) as error:
             raise OSError(str(error)) from None
         self._write(bytes([RESET, ID]))

@@ -1,45 +1,54 @@
 """A process that takes the torque off a board if this process is killed.
 
-It waits for the end of a pipe that only this process holds open, and then writes the message of
-zero torque to the board's port. It needs the standard library alone, so that it is there within
-some hundredths of a second.
+It waits for a lock that this process holds, and then writes the message of zero torque to the
+board's port. On Linux the lock is a mutex that the kernel releases first of all when a thread dies
+(robust, pthread_mutexattr_setrobust(3)): the end of a pipe comes only once all memory is given
+back, which took some 30 ms, and stands in where there are none. The process needs the
+standard library alone, so that it is there within some hundredths of a second.
 """
 
 from __future__ import annotations
 
+import ctypes
+import mmap
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
 _CODE = """
-import os, signal, sys
+import ctypes, mmap, os, signal, sys
 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
     signal.signal(number, signal.SIG_IGN)
 try:
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
 except (AttributeError, OSError):
     pass
-port, message = int(sys.argv[1]), bytes.fromhex(sys.argv[2])
+port, shared, message = int(sys.argv[1]), int(sys.argv[2]), bytes.fromhex(sys.argv[3])
+lock = ctypes.c_char.from_buffer(mmap.mmap(shared, 0)) if shared >= 0 else None
 os.write(1, b"1")
-if not os.read(0, 1):
+if lock and ctypes.CDLL(None).pthread_mutex_lock(ctypes.byref(lock)) or not os.read(0, 1):
     os.write(port, message)
 """
 PRIORITY = 21
 """Of that process, above that of the haptic loop, where the user may."""
+_SIZE = 256
+"""Bytes of a mutex or of its attributes, and more."""
+_SHARED, _ROBUST = 1, 1  # PTHREAD_PROCESS_SHARED, PTHREAD_MUTEX_ROBUST
 
 
 @contextmanager
 def write_if_killed(port: int, message: bytes) -> Iterator[None]:
     """Context in which a process stands by that writes `message` to the file descriptor `port` once
-    this process has ended within the context. POSIX only."""
+    this process, or the thread that has entered the context, has ended within it. POSIX only."""
     code = _CODE.replace("PRIORITY", str(PRIORITY))
+    shared, release = _hold_mutex()
     with subprocess.Popen(
-        [sys.executable, "-I", "-S", "-c", code, str(port), message.hex()],
+        [sys.executable, "-I", "-S", "-c", code, str(port), str(shared), message.hex()],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
-        pass_fds=(port,),
+        pass_fds=(port, shared) if shared >= 0 else (port,),
         start_new_session=True,  # what ends this one's group leaves it
     ) as process:
         assert process.stdin
@@ -51,3 +60,27 @@ def write_if_killed(port: int, message: bytes) -> Iterator[None]:
             with suppress(OSError):
                 process.stdin.write(b"0")
                 process.stdin.close()
+            release()
+
+
+def _hold_mutex() -> tuple[int, Callable[[], object]]:
+    """The file descriptor of shared memory with a mutex that the calling thread holds, and what
+    releases it; -1 and nothing to release where there are no robust ones."""
+    library = ctypes.CDLL(None)
+    if not (hasattr(os, "memfd_create") and hasattr(library, "pthread_mutexattr_setrobust")):
+        return -1, lambda: None
+    shared, attributes = os.memfd_create("held"), ctypes.create_string_buffer(_SIZE)
+    os.ftruncate(shared, _SIZE)
+    memory = mmap.mmap(shared, _SIZE)
+    mutex = ctypes.byref(ctypes.c_char.from_buffer(memory))
+    library.pthread_mutexattr_init(attributes)
+    library.pthread_mutexattr_setpshared(attributes, _SHARED)
+    library.pthread_mutexattr_setrobust(attributes, _ROBUST)
+    library.pthread_mutex_init(mutex, attributes)
+    library.pthread_mutex_lock(mutex)
+
+    def release() -> None:
+        library.pthread_mutex_unlock(mutex)
+        os.close(shared)
+
+    return shared, release

@@ -36,7 +36,6 @@ from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.run_state import RunState
 from hapticlink.orchestrator.run.save_times import Saving
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.system.ports import power_across_rates
 
 Progress = Callable[[float], None]
 Steps = Mapping[str, Any]
@@ -261,8 +260,9 @@ def run(
 
 
 def run_side_by_side(each: Sequence[tuple[Plan, RunResults]], steps: Steps) -> list[Outcome | None]:
-    """Execute plans of systems that differ in start values alone, all at once, with the outcomes of
-    those that lasted; None for the others, which are to be run again alone. Raises Interrupted.
+    """Execute plans of systems with the same FMUs and ticks, all at once, with the outcomes of
+    those that have the first one's operations and lasted; None for the others, which are to be run
+    again alone. Raises Interrupted.
 
     steps: the functions of FMUs that take a step of all at once.
     """
@@ -299,7 +299,7 @@ def _details(
     system, instances = plan.system, simulation.instances
     ages, energies = loop.delays(), simulation.meters.energies()
     errors = {name: check.errors() for name, check in simulation.step_checks.items()}
-    across = power_across_rates(system)
+    across = simulation.power_across_rates
     return RunEnding(
         calls={name: i.calls for name, i in instances.items()},
         delays=ages,

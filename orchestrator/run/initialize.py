@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.components.port_space import PLANE
+from hapticlink.components.port_space import PLANE, POINT
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.base.signal_names import DEVICE
@@ -326,8 +326,9 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
 
 def start_outside(fmu: str, device: Instance) -> FmuFault:
     """The fault of a run that ends before its first step, outside of the device's workspace."""
-    names = (s.name for s in device.description.outputs)
-    start = dict(zip(names, device.outputs.tolist(), strict=True))
-    pose = [start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)]
-    told = describe_start_outside(pose, start["workspace_margin"])
+    outputs = zip(device.description.outputs, device.outputs.tolist(), strict=True)
+    start = {scalar.name: (value, scalar.unit) for scalar, value in outputs}
+    pose, units = zip(*(start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)), strict=True)
+    space = next(each for each in (PLANE, POINT) if each.pose.units == units)
+    told = describe_start_outside(space, pose, start["workspace_margin"][0])
     return FmuFault(fmu, told, 0.0, repeatable=True)

@@ -25,7 +25,6 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 from hapticlink.orchestrator.results.state_file import read_state, write_state
 from hapticlink.orchestrator.run.apply_changes import InputSetter
-from hapticlink.orchestrator.run.compiled.build import HERE
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, array
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.compiled.state import Saved, StateBlock
@@ -67,9 +66,11 @@ def read(path: Path) -> RunState:
 
 @cache
 def _layout() -> str:
-    """What tells states with other contents apart: their code and the structures that they have."""
-    texts = (Path(__file__), HERE / "loop.h")
-    return hashlib.sha256(b"".join(path.read_bytes() for path in texts)).hexdigest()
+    """What tells states with other contents apart: the code that runs a scene and its FMUs."""
+    room = Path(__file__).parent
+    files = sorted(p for folder in (room, room.parent / "fmi") for p in folder.rglob("*.*"))
+    texts = (p.read_bytes() for p in files if p.suffix in (".py", ".c", ".h"))
+    return hashlib.sha256(b"".join(texts)).hexdigest()
 
 
 # --- what can be saved ------------------------------------------------------------------------

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from functools import cached_property
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from hapticlink.orchestrator.run.initialize import StartOrder, initialize
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.pace import Pace
 from hapticlink.orchestrator.run.step_check import StepCheck
+from hapticlink.orchestrator.system.ports import power_across_rates
 from hapticlink.orchestrator.system.system import Connection, InputChange, System
 
 Call = Callable[[int], object]
@@ -97,6 +99,11 @@ class Simulation(LoadedFmus):
         self.meters.take_time(time)
         numerator, begin, denominator = time.ratio
         self.loop.fill(numerator=numerator, begin=begin, denominator=denominator)
+
+    @cached_property
+    def power_across_rates(self) -> list[str]:
+        """Those of its systems, which start values and ticks do not change."""
+        return power_across_rates(self.system)
 
     def _dismiss(self) -> None:
         for instance in self.instances.values():

@@ -34,8 +34,6 @@ def require_fit(state: RunState, system: System, tables: Mapping[str, Any]) -> N
 def why_no_fit(state: RunState, system: System) -> Iterator[str]:
     """What keeps a system from going on from a state, and what to do."""
     saved, time = state.content, system.timeline
-    if (end := time.time(time.end)) <= state.time:
-        yield f"the run ends at {end:g} s, and its time is {state.time:g} s: take a longer duration"
     if missing := [*_unpaired("FMU", saved["fmus"], system.fmu)]:
         yield from missing
         return
@@ -65,6 +63,9 @@ def _unpaired(what: str, before: Mapping[str, Any], now: Mapping[str, Any]) -> I
 
 def _why_other_clocks(state: RunState, system: System) -> Iterator[str]:
     saved, time = state.content, system.timeline
+    if (end := time.time(time.end)) <= state.time:
+        yield f"the run ends at {end:g} s, and its time is {state.time:g} s: take a longer duration"
+        return
     known = saved["events"]["clocks"]
     if saved["base"] != str(time.base) or {*known} != {c.name for c in time.clocks}:
         yield "its rates are others: leave them as they were (`[[at]]` can set graphics.rate later)"

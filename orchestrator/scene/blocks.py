@@ -7,8 +7,9 @@ from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 from hapticlink.components.contact.broad_phase import near
+from hapticlink.components.port_space import POINT
 from hapticlink.components.specs.contacts import ContactsOfAllPairs
-from hapticlink.components.specs.device import Device, Handle
+from hapticlink.components.specs.device import Device, Handle, NumberOrigins
 from hapticlink.components.specs.driver import Driver
 from hapticlink.components.specs.linkage import GraphicsCopy
 from hapticlink.orchestrator.base.signal_names import (
@@ -137,10 +138,13 @@ def _blocks_of_users(scene: Scene) -> Iterator[BlockPlan]:
             settings["clutch"] = True
         if user in partial:
             settings["handle"] = partial[user]
-        if scene.linkage and scene.linkage.dimension > 2:
+        if scene.space == POINT:
             settings["space"] = "point"
         yield BlockPlan(block_of_user(HAND, user), HAND, "haptics", settings)
-    devices = {user: replace(d, driver=None) for user, d in scene.all_devices.items()}
+    devices = {
+        user: replace(d, driver=None, origin=NumberOrigins())
+        for user, d in scene.all_devices.items()
+    }
     beside = {user: devices[user] for user in observed_beside(scene)}
     for user, device in beside.items():
         yield BlockPlan(block_of_user(OBSERVER, user), OBSERVER, "haptics", {"device": device})

@@ -19,10 +19,9 @@ from hapticlink.orchestrator.scene.toml_keys import (
     Place,
     flatten,
     flatten_path,
-    key_lines,
-    loads,
     parts,
     place_of,
+    read_document,
 )
 
 MAX_EXTENDED = 20
@@ -54,11 +53,11 @@ def document(
     TOML, a base that cannot be read, and scenes that extend each other in a circle.
     """
     try:
-        data = loads(text)
+        data, lines = read_document(text)
     except ValueError as error:
         raise SceneFault(name, [Finding("", f"not TOML: {error}", file=file)]) from error
     flatten(data)
-    places = {flatten_path(path): (file, line) for path, line in key_lines(text).items()}
+    places = {flatten_path(path): (file, line) for path, line in lines.items()}
     for fmu in tables_of(data, "fmu"):
         if folder and isinstance(fmu.get("path"), str):
             fmu["path"] = str(folder / fmu["path"])

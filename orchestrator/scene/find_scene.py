@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.resources
+from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -11,9 +12,10 @@ from hapticlink.orchestrator.base.errors import InputFault, near, shorten
 from hapticlink.orchestrator.scene.toml_keys import LARGEST
 
 
-def list_shipped() -> dict[str, Any]:
-    """The files of the scenes that are shipped with the package, by name."""
-    folder = importlib.resources.files("hapticlink.scenes")
+@cache
+def list_shipped(package: str = "hapticlink.scenes") -> dict[str, Any]:
+    """The TOML files that are shipped with the package, of scenes by default, by name."""
+    folder = importlib.resources.files(package)
     names = (entry for entry in folder.iterdir() if entry.name.endswith(".toml"))
     files = {entry.name.removesuffix(".toml"): entry for entry in names}
     return dict(sorted(files.items()))

@@ -18,6 +18,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, Discriminator, Tag, TypeAdapter
 
+from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.ports import Kind
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.control import Controller
@@ -232,6 +233,12 @@ class Scene:
     def source(self) -> Source | None:
         """What the scene was read from; None where it was created or changed in Python."""
         return None
+
+    @property
+    def space(self) -> PortSpace:
+        """That of the ports between its blocks."""
+        moved = self.linkage or self.device
+        return moved.space if moved else PLANE
 
     @property
     def all_hands(self) -> dict[str, Hand]:

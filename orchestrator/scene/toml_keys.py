@@ -7,6 +7,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
+from copy import deepcopy
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any
@@ -93,11 +94,20 @@ def parts(dotted: str) -> tuple[str, ...]:
     return tuple(names)
 
 
-def key_lines(text: str) -> dict[Path, int]:
-    """Line number of each path; entries of arrays of tables have their index in the path.
+def read_document(text: str) -> tuple[dict[str, Any], Mapping[Path, int]]:
+    """The tables of a TOML text, and the line number of each path; entries of arrays of tables have
+    their index in the path. Raises ValueError."""
+    tables, lines = _read_once(text)
+    return deepcopy(tables), lines
 
-    `text` must be valid TOML.
-    """
+
+@lru_cache(64)  # the same files in each variant of a scene
+def _read_once(text: str) -> tuple[dict[str, Any], dict[Path, int]]:
+    return loads(text), _key_lines(text)
+
+
+def _key_lines(text: str) -> dict[Path, int]:
+    """Of a text that is valid TOML."""
     lines: dict[Path, int] = {}
     counts: dict[Path, int] = {}
     table: Path = ()

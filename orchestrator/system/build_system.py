@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,7 @@ from hapticlink.orchestrator.boards.board import ENDS, describe_board
 from hapticlink.orchestrator.boards.driver import find_misfits
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.process_cache import describe_once
+from hapticlink.orchestrator.fmi.start_values import Starts as StartValues
 from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks, blocks, driver_of
 from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
@@ -145,13 +147,14 @@ _SYSTEMS: shelf.Shelf[Assembled] = shelf.Shelf(MAX_SYSTEMS)
 def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
     """A system with the start values that a scene gives its blocks."""
     by_name = {b.name: b for b in planned.own}
-    fmus = tuple(_restarted(fmu, by_name[fmu.name]) for fmu in system.fmus)
-    return replace(system, fmus=fmus, energy=find_energy_ports(scene, fmus, system.connections))
+    starts = (_restarts(fmu, by_name[fmu.name]) for fmu in system.fmus)
+    energy = partial(find_energy_ports, scene, connections=system.connections)
+    return system.restarted(starts, energy)
 
 
-def _restarted(fmu: Fmu, block: BlockPlan) -> Fmu:
-    given = dict(_started(fmu, block).starts)
-    return replace(fmu, starts=tuple((s, given.get(s, value)) for s, value in fmu.starts))
+def _restarts(fmu: Fmu, block: BlockPlan) -> StartValues:
+    given = dict(_starts(fmu, block))
+    return tuple((s, given.get(s, value)) for s, value in fmu.starts)
 
 
 def _assemble(
@@ -263,13 +266,16 @@ def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
     """A block's FMU with the start values that its settings give parameters."""
-    given = (
+    return replace(fmu, starts=_starts(fmu, block))
+
+
+def _starts(fmu: Fmu, block: BlockPlan) -> StartValues:
+    return tuple(
         (s, value)
         for port, values in block.starts.items()
         if (scalars := fmu.description.port(port, "parameter", "input"))
         for s, value in zip(scalars, values, strict=True)
     )
-    return replace(fmu, starts=tuple(given))
 
 
 def _faults(scene: Scene, problems: Iterable[Problem]) -> SceneFault:

@@ -32,7 +32,7 @@ _INDEX = re.compile(r"[\[(_ ]?(\d+(?:[,_]\d+)?)[\])]?$")
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _PRODUCT = re.compile(rf"(?P<sign>-?)\s*(?:(?P<before>{_NUMBER})\s*\*\s*)?"
                       rf"(?P<name>.*?)\s*(?:\*\s*(?P<after>{_NUMBER}))?", re.DOTALL)  # fmt: skip
-_LISTED = re.compile(r"\{([^{}]*)\}")
+_LISTED = re.compile(r"\{([^{},]+(?:,[^{},]+)*)\}")
 
 
 class Term(NamedTuple):
@@ -194,6 +194,11 @@ def _find_terms(description: Description, given: str | tuple[str, ...]) -> Itera
         if not 0 < abs(factor) < math.inf:
             raise ValueError(f"{text}: a factor is a finite number other than 0")
         for name in _expand(written["name"]):
+            if {*name} & {*"{}"}:
+                raise ValueError(
+                    f"{text}: a brace without its other, or an empty entry: write a list as "
+                    "tau_{x,y,z}"
+                )
             yield from _terms(description, name, factor)
 
 

@@ -147,6 +147,11 @@ class EnergyPorts:
     driven: bool = False
     """Whether drives or forces of plugins put energy into the mechanism."""
 
+    @property
+    def without_gains(self) -> tuple[object, ...]:
+        """These with the number of springs alone."""
+        return self.power, len(self.springs), self.in_play, self.driven
+
     def coupling(self, c: Connection, connections: Iterable[Connection]) -> SetSpring | None:
         """The spring-damper whose force a connection has, if both its ends move with a mobility
         that is known, each of these is brought by one connection, and there are no more entries
@@ -253,8 +258,18 @@ class System:
         time = self.timeline
         late = any(c.latency for c in self.connections)
         clocks = time if late else ([c.name for c in time.clocks], time.of)
-        rest = replace(self, fmus=fmus, energy=replace(self.energy, springs=()), timeline=_NO_TIME)
-        return rest, names, len(self.energy.springs), changed, clocks
+        rest = replace(self, fmus=fmus, energy=EnergyPorts(), timeline=_NO_TIME)
+        return rest, names, self.energy.without_gains, changed, clocks
+
+    def restarted(self, starts: Iterable[Starts], energy: Callable[..., EnergyPorts]) -> System:
+        """The system with other start values of the same variables of its FMUs; `energy` gives the
+        energy ports of FMUs that have them."""
+        every = zip(self.fmus, starts, strict=True)
+        fmus = tuple(replace(fmu, starts=own) for fmu, own in every)
+        made = replace(self, fmus=fmus, energy=energy(fmus))
+        if made.energy.without_gains == self.energy.without_gains:
+            vars(made)["_of_objects"] = self._of_objects
+        return made
 
     @cached_property
     def early(self) -> frozenset[str]:

@@ -20,11 +20,13 @@ def row(name: str) -> dict[str, Any]:
     judged = measure.judged(name)
     device = hl.scene(measure.SCENE, given).device
     assert device is not None
-    errors = {}
-    for sensing in ("ideal", "encoders"):
-        run = hl.run(measure.SCENE, given | {"sensing": sensing}, figures=False)
-        end = run.run["end"]
-        errors[sensing] = (float(run.tracking().distance_mm.max()), end["reason"], end["time"])
+    errors, alone = {}, {}
+    for bias in ("full", "none"):
+        for sensing in ("ideal", "encoders"):
+            changed = given | {"controller.bias": bias, "sensing": sensing}
+            errors[f"bias {bias}, {sensing}"] = tracked(changed)
+            without = {"controller.topology": False, "duration": measure.ALONE}
+            alone[f"bias {bias}, {sensing}"] = tracked(changed | without)
     return {
         "device": name,
         "renders": device.handle.angle,
@@ -34,7 +36,15 @@ def row(name: str) -> dict[str, Any]:
         "checks": [asdict(check) | {"agrees": check.agrees} for check in judged.checks],
         "rendered": asdict(measure.rendered(device)),
         "errors": errors,
+        "without_topology": alone,
     }
+
+
+def tracked(options: measure.Options) -> tuple[float, str, float]:
+    """Of a run: the largest distance (mm) of operational point and handle, how it ended, when."""
+    run = hl.run(measure.SCENE, options, figures=False)
+    end = run.run["end"]
+    return float(run.tracking().distance_mm.max()), end["reason"], end["time"]
 
 
 def main() -> None:

@@ -33,6 +33,8 @@ BESIDE = (0.8, 1.25)
 """Factors on the margin, with which the verdicts are checked."""
 FINE = 0.05
 """Of the margin's logarithm."""
+ALONE = 12.0
+"""Duration (s) of the runs without topology controller."""
 COUPLING = 100.0
 """K_pc (N/m) of the scene."""
 Options = dict[str, Any]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from hapticlink.orchestrator.results.numbers import short
-from studies.devices.measure import COUPLING
+from studies.devices.measure import ALONE, COUPLING
 
 
 def text(rows: Sequence[dict[str, Any]]) -> str:
@@ -26,9 +26,15 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
         "observer (rad/s)",
         "error of the force by a count (N)",
     )
-    errors = (
-        f"| {row['device']} | {_error(row, 'ideal')} | {_error(row, 'encoders')} |" for row in rows
+    ways = list(rows[0]["errors"])
+    tracked, alone = (
+        [
+            f"| {row['device']} | {' | '.join(_error(*row[k][way]) for way in ways)} |"
+            for row in rows
+        ]
+        for k in ("errors", "without_topology")
     )
+    heads = f"| device | {' | '.join(ways)} |", "|---" + "|--:" * len(ways) + "|"
     lines = (
         "# Devices",
         "",
@@ -47,11 +53,22 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
         "",
         "## Tracking",
         "",
-        "Largest distance of operational point and handle, graphics at 30 Hz, 3 s.",
+        "Largest distance (mm) of operational point and handle in 3 s, graphics at 30 Hz, and when "
+        "the handle left the workspace, which ends a run: with and without velocity terms "
+        "(`controller.bias`), with ideal sensing, and with encoders and default gains.",
         "",
-        "| device | ideal sensing (mm) | encoders, default gains (mm) |",
-        "|---|--:|--:|",
-        *errors,
+        *heads,
+        *tracked,
+        "",
+        f"The same without topology controller, in {ALONE:g} s:",
+        "",
+        *heads,
+        *alone,
+        "",
+        "With bias full and ideal sensing the law (4.6) asks for the acceleration that the "
+        "mechanism has, which has no part along constrained directions: errors of sampling alone "
+        "push the handle that way, so that it stays near for some seconds without a topology "
+        "controller. With velocity terms left out, or with observed forces, it leaves sooner.",
         "",
         "## Verdicts and runs",
         "",
@@ -78,10 +95,11 @@ def _rendered(row: dict[str, Any]) -> str:
     )
 
 
-def _error(row: dict[str, Any], sensing: str) -> str:
-    distance, reason, time = row["errors"][sensing]
-    ended = "" if reason == "duration" else f" ({reason} at {time:.3g} s)"
-    return f"{short(distance)}{ended}"
+def _error(distance: float, reason: str, time: float) -> str:
+    if reason == "duration":
+        return short(distance)
+    why = "where the handle leaves the workspace" if reason == "stop_when" else reason
+    return f"{short(distance)} until {time:.3g} s, {why}"
 
 
 def _check(row: dict[str, Any], check: dict[str, Any]) -> str:

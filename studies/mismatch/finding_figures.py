@@ -21,6 +21,7 @@ from studies.mismatch.methods import (
     BIAS,
     COLUMNS,
     COMPARED,
+    EARLY,
     FEW,
     GAINS,
     INTEGRATORS,
@@ -33,7 +34,7 @@ from studies.mismatch.methods import (
 )
 
 SOME = "some draws unstable; of the others"
-NAMED = ("zoh", "foh", "second-order", "passive")
+NAMED = ("zoh", "foh", "second-order", "passive", EARLY)
 """The holds that have a colour."""
 STRONGEST = 20.0
 """Growth (1/s) at which the figure of margins ends."""
@@ -174,7 +175,7 @@ def _margins(folder: Path, found: Found) -> Iterator[str]:
     )
     unit = f"margin (1/s), drawn from {-STRONGEST:g} on"
     made = lines(
-        folder, "margins.png", title, drawn, unit, NAMED[:3], hollow="unstable", scale="symlog"
+        folder, "margins.png", title, drawn, unit, NAMED, hollow="unstable", scale="symlog"
     )
     yield _text(f"{title}. {_signs(found)}", made, "Stability margin by hold, rate and gains")
 

@@ -15,15 +15,15 @@ COLUMNS = (*RATES, VARIABLE)
 FEW = ("10", "30", "57", VARIABLE)
 """The rates at which all is tried, without Coriolis compensation; elsewhere of the holds LIKELY,
 and neither the report's gains nor the integrators."""
-LIKELY = ("zoh", "foh", "second-order", "passive", "foh-derivative, passive")
+LIKELY = ("zoh", "foh", "second-order", "passive", "foh-derivative, passive", EARLY)
 KEPT_APART, NEAREST = "22", "20"
 """A rate at which nothing is chosen, whose frames are no whole ticks, and the row it takes."""
 BIAS = ("none", "full")
 OF_MATRICES = ("zoh", "foh", "second-order", "delayed", "model")
 """Holds that are tried on Lambda^-1 and P_c."""
-OF_MOTION = tuple(hold for hold in HOLDS if hold not in ("model", EARLY))
-"""Holds that are tried on what a mechanism at the graphics rate and its loop exchange; early steps
-have a study of their own."""
+OF_MOTION = tuple(hold for hold in HOLDS if hold != "model")
+"""Holds that are tried on what a mechanism at the graphics rate and its loop exchange, the hold
+`model` with what it stands for in both directions."""
 
 REPORT = "stiff"
 INTEGRATORS = ("rk4", "semi-implicit-euler", "passive-midpoint")

@@ -20,7 +20,7 @@ from scipy.linalg import expm, solve_discrete_are
 
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.device.models import device_model
-from hapticlink.components.device.variables import F_HAND_OBSERVED, X_START, C, M, V, X
+from hapticlink.components.device.variables import seen, start_pose
 from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator import open_scene
 
@@ -50,7 +50,7 @@ def tried_observer() -> Component:
     block = Block(
         inputs=[Variable("q", (4,), "rad"), Variable("tau", (4,), "N.m")],
         parameters=[
-            X_START,
+            start_pose(PLANE),
             *model.parameters,
             Variable("encoder_resolution", (), "rad", device.encoders[0].resolution),
             Variable("g", (4,), "1", 0.0),
@@ -60,7 +60,7 @@ def tried_observer() -> Component:
             *(Variable(f"{name}_observer", *PLANE.pose) for name in ("x", "v", "F", "dF")),
             Variable("period", (), "s"),
         ],
-        outputs=[X, V, F_HAND_OBSERVED, M, C],
+        outputs=list(seen(PLANE, force=True)),
     )
     s, u, p = block.x, block.u, block.p
     x, v, F, rate = (s[f"{name}_observer"] for name in ("x", "v", "F", "dF"))

@@ -74,14 +74,22 @@ def test_a_verdict_says_for_what_it_is_and_what_it_left_out() -> None:
     0.3 mm beside a pose in which small motions decay can go on for ever."""
     held = verdict(("0 s", "light touch", -1.0, "stable", "oscillation"))
     assert not any(line.startswith("judged for") for line in held.lines())
-    options = {"hold": "passive", "sensing": "encoders"}
-    with linearisable("closed-loop-direct", options) as (_, system, removed):
-        frozen = (*removed, *describe_switches(system))
-    (line,) = (x for x in replace(held, frozen=frozen).lines() if x.startswith("judged for"))
-    assert line == (
+
+    def said(**options: Any) -> str:
+        with linearisable("closed-loop-direct", options) as (_, system, removed):
+            frozen = (*removed, *describe_switches(system))
+        (line,) = (x for x in replace(held, frozen=frozen).lines() if x.startswith("judged for"))
+        return line
+
+    assert said(hold="passive", sensing="encoders") == (
         "judged for small motions; taken out: quantisation of the encoders, the friction of hold "
         "passive; as at the equilibrium: saturation of the motors, and the stops, number of "
         "constrained directions"
+    )
+    early = {"hold": "model", "downsampling": "model", "directions_from": "mechanism"}
+    assert said(sensing="ideal", **early).endswith(
+        "number of constrained directions; as half-lead, its law for motions far below 10 um in a "
+        "step: larger ones may decay: hold reaction"
     )
 
 

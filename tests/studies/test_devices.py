@@ -44,6 +44,7 @@ def row(says: str, run: str) -> dict[str, object]:
         "checks": [{**vars(check), "agrees": check.agrees}],
         "rendered": vars(measure.Rendered((0.1, 0.2), 1.0, 1e-5, 50.0, 0.1)),
         "errors": {"ideal": (1.0, "duration", 3.0), "encoders": (2.0, "stop_when", 1.0)},
+        "without_topology": {"ideal": (9.0, "stop_when", 2.0), "encoders": (3.0, "duration", 12.0)},
     }
 
 
@@ -59,4 +60,5 @@ def test_a_page_counts_the_verdicts_that_runs_bear_out(says: str, run: str, coun
     text = page.text([row(says, run)])
     assert counted in text
     assert "| twin | forces and moments | 200 | 0.1 to 0.2 |" in text
-    assert "| twin | 1 | 2 (stop_when at 1 s) |" in text
+    assert "| twin | 1 | 2 (left at 1 s) |" in text
+    assert "| twin | 9 (left at 2 s) | 3 |" in text

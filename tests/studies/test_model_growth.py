@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from studies.model_growth import Cell, agree, eigenvalues, of_map, of_run
+from studies.model_growth import FAR, Cell, agree, eigenvalues, left_of, of_map, of_run
 
 
 def test_the_eigenvalues_of_a_linear_system_are_found_in_its_snapshots() -> None:
@@ -24,3 +24,11 @@ def test_a_run_grows_as_fast_as_the_map_tells(cell: Cell) -> None:
     assert told > 0.1
     assert agree(told, of_run(cell, P))
     assert not agree(told, -told)
+
+
+def test_larger_motions_decay_where_those_far_below_10_um_grow() -> None:
+    """The map has `half-lead` in the place of `reaction`, and grows as that does."""
+    cell = Cell("four-bar", "firm", 16, 500.0, off=FAR)
+    assert of_map(cell)[0] > 0.1
+    assert left_of(cell, "reaction") < 100.0
+    assert left_of(cell, "half-lead") > 3000.0

@@ -29,6 +29,7 @@ export function text(value, unit) {
 export const themed = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
 
 export const SECOND = "#dd6600"; // of the second of two runs in one picture
+export const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4]; // real-time factors that pages offer
 
 // Colours of marks and curves in the dark: greys change places, hues are lighter.
 const DARK = {

@@ -1,5 +1,5 @@
 // The controls of the running FMUs. They show the values that the run reports, not those last set.
-import { text } from "./canvas.js";
+import { SPEEDS, text } from "./canvas.js";
 import { set } from "./settings.js";
 
 const NAMES = {
@@ -24,7 +24,7 @@ const titled = (gain) => {
 
 // By the first part of the keys of controls: the group in which they are, in the order of the page.
 const GROUPS = {
-  linkage: "Hand", graphics: "Rate", controller: "Controller", model: "Holds, between the rates", holds: "Holds, between the rates", gains: "Gains",
+  linkage: "Hand", graphics: "Rate", speed: "Time", controller: "Controller", model: "Holds, between the rates", holds: "Holds, between the rates", gains: "Gains",
   jitter: "Expert: jitter, delays", delays: "Expert: jitter, delays",
 };
 const LEFT = -1.05; // of a gain's slider: 0, then 0.1 to 10 times the scene's value
@@ -59,6 +59,11 @@ export class Controls {
     const rates = RATES.filter((rate) => rate <= max);
     this.slider(key, `${words} at`, [0, rates.length - 1, 1], (i) => rates[i],
       ({ value }) => (value ? [rates.findLastIndex((rate) => rate <= value), text(value, "Hz")] : [0, "varying"]));
+  }
+
+  speed({ key }) {
+    this.slider(key, "Real-time factor", [0, SPEEDS.length - 1, 1], (i) => SPEEDS[i],
+      ({ value }) => [SPEEDS.findLastIndex((speed) => speed <= value), `${value}×`]);
   }
 
   controller({ key }) {

@@ -1,6 +1,6 @@
 // How a run ended that did not go on: its cause in a line, and the last moments in slow motion.
 const LAST = 0.2, SLOWER = 10; // s that are shown again, and how much slower
-export const DIVERGED = /not finite|diverge/i; // in the cause of a run that did
+export const DIVERGED = /became -?(nan|inf)|not finite|diverge/i; // in the cause of a run that did
 
 export class Ending {
   constructor(host, again) {

@@ -42,7 +42,7 @@ export class FirstMinute {
     this.send = send;
     this.swings = new Swings();
     const $ = (id) => host.querySelector(`#${id}`);
-    [this.slider, this.hertz, this.light, this.felt, this.remedy, this.why] = ["slow", "hertz", "felt", "said", "remedy", "why"].map($);
+    [this.slider, this.ends, this.hertz, this.light, this.felt, this.remedy, this.why] = ["slow", "ends", "hertz", "felt", "said", "remedy", "why"].map($);
   }
 
   // Whether the scene is one that shows it.
@@ -52,6 +52,7 @@ export class FirstMinute {
     if (!this.offered) return false;
     const { rate, rates, softer, about } = this.offered;
     Object.assign(this.slider, { min: 0, max: rates.length - 1, step: 1 });
+    this.ends.replaceChildren(...[rates[0], rates.at(-1)].map((hertz) => Object.assign(document.createElement("span"), { textContent: `${hertz} Hz` })));
     this.slider.oninput = () => this.send(set(rate.key, rates[this.slider.value]));
     this.remedy.hidden = !softer.length;
     this.remedy.querySelector("small").textContent = about;

@@ -2,6 +2,7 @@
 
 import { loudness } from "./loudness.js";
 
+export const SPEED = "speed";
 const RATE = "graphics.rate", RENDERED = "controller.topology", POINT = "linkage.operational_point";
 // The key of what is set at once: a rate with its jitter, a hold with its delay.
 const together = (key) => (key === "jitter" ? RATE : key.replace(/^delays\./, "holds."));
@@ -62,6 +63,7 @@ export class Program {
   // Carries out what is set of a control.
   act(key) {
     const [kind] = key.split("."), name = key.slice(kind.length + 1);
+    if (key === SPEED) return; // the worker's
     if (key === RATE) this.rate();
     else if (kind === "holds") this.hold(name);
     else if (key === POINT) this.point();

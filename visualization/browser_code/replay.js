@@ -1,5 +1,5 @@
 // A replay of one or two recorded runs: time, pictures, charts and episodes.
-import { SECOND } from "./canvas.js";
+import { SECOND, SPEEDS } from "./canvas.js";
 import { Charts } from "./charts.js";
 import { tags } from "./legend.js";
 import { Lanes } from "./lanes.js";
@@ -7,7 +7,6 @@ import { Recording } from "./recording.js";
 import { Stage } from "./stage.js";
 
 const $ = (id) => document.getElementById(id);
-const SPEEDS = [0.05, 0.1, 0.25, 0.5, 1, 2, 4];
 const data = JSON.parse($("data").textContent);
 const recordings = data.runs.map((run) => new Recording(run));
 const end = Math.max(...recordings.map((r) => r.end), 1e-9);

@@ -1,6 +1,6 @@
 // The worker of a page that needs nothing else: runs the scene beside the clock, once or with two settings beside each
 // other, and answers the page's messages as the server does.
-import { Program } from "./program.js";
+import { Program, SPEED } from "./program.js";
 
 const BEHIND = 0.1; // s, by which a run may be late before time is moved
 const LONGEST = 600; // s, of a recording
@@ -8,10 +8,13 @@ let module, data, runs = [], origin = 0, missed = 0, rows = null, heard = null;
 const changed = [{}]; // of run A, and of B where there are two
 const state = { type: "state", paused: false, recording: null, ended: null };
 const seconds = () => performance.now() / 1e3;
+const speed = () => changed[0][SPEED] ?? 1; // which both runs have
+const now = () => (seconds() - origin) * speed(); // s, the simulated time that it is
+const setNow = (time) => { origin = seconds() - time / speed(); };
 
 function begin() {
   state.ended = null;
-  origin = seconds();
+  setNow(0);
   rows = state.recording ? changed.map(() => []) : null;
   runs = changed.map((each) => new Program(module, data, each));
   guarded(tick); // that of t = 0
@@ -23,7 +26,7 @@ function tell() {
   const [a, b] = runs.map((run) => run.controls);
   postMessage({ type: "controls", controls: a, b: b && { controls: b } });
   postMessage(state);
-  const is_changed = JSON.stringify(a) !== JSON.stringify(data.controls);
+  const is_changed = a.some(({ key, value }, i) => key !== SPEED && value !== data.controls[i].value);
   postMessage(is_changed ? { ...data.map, verdict: "", said: "computed for the settings of the start alone" } : data.map);
 }
 
@@ -46,12 +49,12 @@ function tick() {
 // All haptic events that are due.
 function turn() {
   if (!state.paused && !state.ended) guarded(() => {
-    const late = seconds() - origin - runs[0].due;
-    if (late > BEHIND) {
+    const late = now() - runs[0].due, until = seconds() + BEHIND;
+    if (late > BEHIND * speed()) {
       missed += Math.round(late * data.scene.haptics);
-      origin += late;
+      setNow(runs[0].due);
     }
-    while (!state.ended && runs[0].due <= seconds() - origin) tick();
+    while (!state.ended && runs[0].due <= now() && seconds() < until) tick();
   });
   if (heard?.samples.length) {
     heard.port.postMessage(heard.samples);
@@ -82,7 +85,7 @@ const HANDLERS = {
   time(message) {
     switch (message.do) {
       case "pause": state.paused = true; break;
-      case "resume": state.paused = false; origin = seconds() - runs[0].due; break;
+      case "resume": state.paused = false; setNow(runs[0].due); break;
       case "step": state.paused = true; guarded(tick); break;
       case "reset": return begin();
       case "record":
@@ -105,9 +108,11 @@ const HANDLERS = {
 onmessage = ({ data: message }) => {
   const handler = HANDLERS[message.type];
   if (handler) { handler(message); return; }
-  const is_hand = message.type === "hand", on = is_hand ? runs : [runs[message.b ? 1 : 0]];
+  const is_hand = message.type === "hand", is_speed = message.key === SPEED;
+  const on = is_hand || is_speed ? runs : [runs[message.b ? 1 : 0]], time = now();
   try { for (const run of on) run?.apply(message); } catch (error) {
     if (!state.ended) postMessage({ type: "refused", why: error.message }); // the next run has what is set behind an end
   }
+  if (is_speed) setNow(time);
   if (!is_hand && runs.length) tell();
 };

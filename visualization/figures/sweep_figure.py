@@ -168,13 +168,23 @@ def _named(metric: str) -> str:
 
 def unit(key: str) -> str:
     """The unit of a scene's key; "" if it has none or is not in `UNITS`."""
-    return UNITS.get(key.rpartition(".")[2], "")
+    return "s" if key.startswith("delays.") else UNITS.get(key.rpartition(".")[2], "")
 
 
 def words(key: str) -> str:
     """A scene's key in words: `linkage.body.link0.mass` is `mass of link0`."""
-    path = [name.replace("_", " ") for name in overrides.parse(f"{key}=")[0]]
+    first, *rest = overrides.parse(f"{key}=")[0]
+    if first == "delays" and rest:
+        return f"delay of {'.'.join(rest)}"
+    path = [name.replace("_", " ") for name in (first, *rest) if name != "start"]
     return QUANTITIES.get(key) or " of ".join(reversed(path[-2:]))
+
+
+def setting(key: str, value: Any) -> str:
+    """A key in words with its value, `graphics rate = 30 Hz`."""
+    exactly = number(value)
+    written = value if exactly is None else f"{exactly:.6g}"
+    return f"{words(key)} = {written} {unit(key)}".rstrip()
 
 
 def axis(key: str) -> str:
@@ -190,7 +200,7 @@ def finding(
     name, _, measured = quantity.partition(" (")
     named = _naming(best, keys)
     given = ((k, best.get(k, "as in the scene")) for k in named)
-    where = ", ".join(f"{words(k)} = {value} {unit(k)}".rstrip() for k, value in given)
+    where = ", ".join(setting(k, value) for k, value in given)
     text = f"{name[:1].upper()}{name[1:]} down to {short(value)} {measured.rstrip(')')}".rstrip()
     few = f"; {ended} of {of} runs ended early or failed" if ended else ""
     return f"{text} at {where}{few}"

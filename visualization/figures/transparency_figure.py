@@ -30,7 +30,8 @@ def draw(found: Sequence[Transparency]) -> Figure:
         for constraint in pose.constrained if shown else ():
             third[0].loglog(HERTZ, constraint.stiffness, color=colour, label=pose.pose)
     felt.axhspan(1 - FORCE, 1 + FORCE, color="0.9", zorder=0)
-    felt.text(HERTZ[0], 1.01 - FORCE, "within what a person can tell", fontsize="small")
+    within = {"fontsize": "small", "ha": "right"}  # where the curves have gone down
+    felt.text(HERTZ[-1], 1.01 - FORCE, "within what a person can tell", **within)
     felt.set_ylabel("felt inertia / that of the mechanism")
     felt.legend(fontsize="small")
     error.axhline(100 * FORCE, color="tab:red", lw=1.0)
@@ -54,5 +55,5 @@ def _finding(found: Sequence[Transparency]) -> str:
     if np.isinf(worst):
         return f"force and direction are right up to {HERTZ[-1]:g} Hz"
     if not worst:
-        return f"the inertia is wrong from {HERTZ[0]:g} Hz on"
+        return f"the inertia is wrong already at {HERTZ[0]:g} Hz"
     return f"the inertia is felt right up to {short(worst)} Hz"

@@ -14,7 +14,7 @@ from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.visualization.curve_colours import CURVES
 from hapticlink.visualization.figure_axes import headline, plain
-from hapticlink.visualization.figures.sweep_figure import axis, unit, words
+from hapticlink.visualization.figures.sweep_figure import axis, setting
 
 STYLES = {
     STABLE: ("-", "stable in its own hand"),
@@ -50,7 +50,7 @@ def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
             panel.plot(at, largest, style, color=colour, marker=".", lw=1.3)
             ends = [k for k, kind in enumerate(kinds) if kind == AT_LEAST]
             panel.plot([at[k] for k in ends], [largest[k] for k in ends], "^", color=colour, ms=7)
-        name = ", ".join(f"{k} = {v}" for k, v in zip(others, values, strict=True))
+        name = ", ".join(setting(k, v) for k, v in zip(others, values, strict=True))
         if others:
             handles.append(Line2D([], [], color=colour, label=plain(name)))
     drawn = [what for what in STYLES if any(row.get(f"largest_{what}") for row in rows)]
@@ -59,8 +59,7 @@ def draw(rows: Sequence[Row], key: str, axes: Sequence[Axis]) -> Figure:
         handles.append(
             Line2D([], [], color="k", marker="^", ls="", label="at least (end of search)")
         )
-    across, up = (axis(name.replace(".start.", ".")) for name in (x.key, key))
-    panel.set(xlabel=across, ylabel=f"largest {up}", yscale="log")
+    panel.set(xlabel=axis(x.key), ylabel=f"largest {axis(key)}", yscale="log")
     panel.grid(visible=True, which="both", lw=0.3)
     headline(panel, finding(rows, [a.key for a in axes]), 90)
     columns = 1 if any(len(str(one.get_label())) > WIDEST for one in handles) else 2
@@ -77,7 +76,7 @@ def finding(rows: Sequence[Row], keys: Sequence[str]) -> str:
         return few.capitalize()
 
     def said(row: Row) -> str:
-        point = ", ".join(f"{words(key)} = {row[key]} {unit(key)}".rstrip() for key in keys)
+        point = ", ".join(setting(key, row[key]) for key in keys)
         at_least = "at least " if row[STABLE] == AT_LEAST else ""
         return f"{at_least}up to {short(row[f'largest_{STABLE}'])} at {point}"
 

@@ -36,12 +36,14 @@ CLOCK = "graphics"
 """The clock whose rate the page changes."""
 
 
-RATE, JITTER, RENDERED = "graphics.rate", "jitter", "controller.topology"
+RATE, JITTER, RENDERED, SPEED = "graphics.rate", "jitter", "controller.topology", "speed"
 """Keys of the controls of the rate (Hz), of the share of its period by which each may be shorter or
-longer, and of whether constrained directions are rendered. Further ones, by connection and
-parameter: `holds.NAME`, `delays.NAME` (s) and `gains.NAME`, a factor on the scene's value."""
+longer, of whether constrained directions are rendered, and of the real-time factor, which all runs
+of a page have. Further ones, by connection and parameter: `holds.NAME`, `delays.NAME` (s) and
+`gains.NAME`, a factor on the scene's value."""
 RANGES = {
-    "graphics": (0.01, 1e4), "jitter": (0.0, 0.9), "delays": (0.0, 1.0), "gains": (0.0, 1e2)
+    "graphics": (0.01, 1e4), "jitter": (0.0, 0.9), "delays": (0.0, 1.0), "gains": (0.0, 1e2),
+    SPEED: (1e-3, 1e3),
 }  # fmt: skip
 """Of the values of controls that are numbers, by the first part of their key."""
 Settings = dict[str, Any]
@@ -60,6 +62,7 @@ class Offered:
         ranges: Mapping[str, tuple[float, float]] = RANGES,
     ) -> None:
         self._linkage = scene.linkage
+        self._hardware = any(fmu.hardware for fmu in system.fmus)
         model = has_model(scene)
         self.model = model if model or can_have_model(scene, system) else None
         """Whether the hold `model` is chosen, None where the scene cannot have it."""
@@ -87,6 +90,8 @@ class Offered:
             rate: dict[str, Any] = {"key": RATE, "value": self.own_rate, "words": _title(self._of)}
             rate["haptics"] = self._haptics
             controls += [rate, {"key": JITTER, "value": 0.0}]
+        if not self._hardware:
+            controls.append({"key": SPEED, "value": 1.0})
         if self.topology:
             controls.append({"key": RENDERED, "value": True})
         if self.model is not None:

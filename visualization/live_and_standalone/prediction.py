@@ -11,10 +11,9 @@ import numpy as np
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.frozen_nonlinearities import has_friction
 from hapticlink.analysis.stability.hand_cases import Case, InHands, worst_case
-from hapticlink.analysis.stability.hands import HANDS
+from hapticlink.analysis.stability.hands import hands_in
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.modes import DRIFT
-from hapticlink.analysis.stability.poses import require_planar_port
 from hapticlink.analysis.stability.resting_scene import resting_system
 from hapticlink.analysis.stability.state_vector import size
 from hapticlink.components.specs.hand import SpringHand
@@ -92,7 +91,6 @@ def judge_hands(
         raise InputFault("with jitter the system never repeats; set the jitter to 0")
     if scene.hand is None or scene.linkage is None:
         raise InputFault("nobody holds the mechanism")
-    require_planar_port(scene)
     changed = _at_rate(scene, settings.get(RATE))
     with (
         interrupt.defer_signals(),
@@ -111,7 +109,8 @@ def judge_hands(
             ),
         )
         stiffness, damping = mouse(scene.linkage)
-        hands = {MOUSE: SpringHand(stiffness=stiffness, damping=damping), **HANDS}
+        pulled = SpringHand(stiffness=stiffness, damping=damping)
+        hands = {MOUSE: pulled, **hands_in(scene.space)}
         without, _ = frozen_nonlinearities.without(system)
         calming = {c.hold for c in system.connections if has_friction(c)}
         beside = "".join(f", without the friction of hold {hold}" for hold in calming)

@@ -14,6 +14,7 @@ from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
 
+Three = tuple[float, float, float]
 STIFFNESS, DAMPING = (100.0, 0.0), (5.0, 0.005)
 """Of the mouse's spring and damper to the handle along and about axes: they leave its turn free but
 damped."""
@@ -53,10 +54,10 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
     return open_scene.load(read, changes)
 
 
-def mouse(linkage: Linkage) -> tuple[tuple[float, ...], tuple[float, ...]]:
+def mouse(linkage: Linkage) -> tuple[Three, Three]:
     """Stiffness and damping of the mouse's spring, an entry for each direction of the handle."""
-    turns = linkage.space.turns
-    return tuple(STIFFNESS[turn] for turn in turns), tuple(DAMPING[turn] for turn in turns)
+    x, y, z = linkage.space.turns
+    return (STIFFNESS[x], STIFFNESS[y], STIFFNESS[z]), (DAMPING[x], DAMPING[y], DAMPING[z])
 
 
 def simulated(scene: Scene) -> Scene:

@@ -18,6 +18,7 @@ from hapticlink.visualization.live_and_standalone.offered_controls import (
     MODEL,
     RATE,
     RENDERED,
+    SPEED,
     Offered,
     Settings,
     stiffness,
@@ -76,6 +77,8 @@ class Controls:
             return  # a run begins with it
         if key == RATE:
             self._change_rate()
+        elif key == SPEED:
+            self._live.speed = self._settings[key]
         elif key == OPERATIONAL_POINT:
             self._live.set(key, self._settings[key])
         elif kind == "holds":

@@ -29,6 +29,7 @@ from websockets.http11 import Request, Response
 
 from hapticlink.visualization.browser_code.one_file import PAGE, headers
 from hapticlink.visualization.live_and_standalone.choose_model import MODEL
+from hapticlink.visualization.live_and_standalone.offered_controls import SPEED
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.server_pipe import (
     ChildProcess,
@@ -77,7 +78,8 @@ class Pages:
         kind = message["type"]
         if kind == "settings":
             self._newest[kind] = message
-            self._stability.ask(message["scene"], message["settings"], message["parameters"])
+            settings = {k: v for k, v in message["settings"].items() if k != SPEED}
+            self._stability.ask(message["scene"], settings, message["parameters"])
             return
         if kind == "opening":
             self._picture = message.pop("picture")
@@ -188,13 +190,15 @@ class Pages:
             self._tell(message)
 
     def _tell(self, message: messages.Message) -> None:
-        """Tell the run that a change is of, or both of a hand and a button."""
-        of_second = isinstance(message, messages.SetControl) and message.b and self._second
+        """Tell the run that a change is of, or both of a hand, a button and the speed."""
+        control = message if isinstance(message, messages.SetControl) else None
+        of_one = control is not None and control.key != SPEED
+        of_second = of_one and control and control.b and self._second
         if not of_second:
             write_message(self._out, message)
-        if self._second and (of_second or not isinstance(message, messages.SetControl)):
+        if self._second and (of_second or not of_one):
             self._second.send(message)
-        if isinstance(message, messages.SetControl) and message.key == MODEL:
+        if control and control.key == MODEL:
             if of_second:
                 self._newest_of_second.pop("scene", None)  # both begin anew with the next one
             else:

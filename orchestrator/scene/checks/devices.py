@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.device import Device, Handle
 from hapticlink.orchestrator.scene.checks.linkage import check_linkage
+from hapticlink.orchestrator.scene.checks.space import check_joints_and_inertias
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
@@ -17,10 +18,26 @@ def check_devices(scene: Scene) -> Iterator[Problem]:
     for user, device in scene.all_devices.items():
         here: Path = ("devices", user) if user else ("device",)
         alone = replace(scene, linkage=device.linkage, graphics=None)
-        for path, why in check_linkage(alone):
+        found = [*check_linkage(alone)]
+        if device.linkage.spatial:
+            found += check_joints_and_inertias(device.linkage)
+            yield from _of_the_plane(device, here)
+        for path, why in found:
             inside = ("handle", *path[2:]) if path[:2] == _HANDLE else path[1:]
             yield (*here, *inside), why
         yield from _joints(device, here)
+
+
+def _of_the_plane(device: Device, here: Path) -> Iterator[Problem]:
+    """Problems of keys that a device in space does not have."""
+    for key in ("angle", "along"):
+        if getattr(device.handle, key) != getattr(Handle(body=""), key):
+            text = "is of the plane: in space the handle is a point, of three forces: take it out"
+            yield (*here, "handle", key), text
+    for i, loop in enumerate(device.loop):
+        if loop.type == "revolute":
+            text = "a pin is of the plane: in space take a rod, which closes a loop by its length"
+            yield (*here, "loop", i, "type"), text
 
 
 def _joints(device: Device, here: Path) -> Iterator[Problem]:

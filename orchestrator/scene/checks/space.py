@@ -7,6 +7,8 @@ from typing import get_args
 
 import numpy as np
 
+from hapticlink.components.specs.control import Teleoperation
+from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop
@@ -15,8 +17,7 @@ from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 PARALLEL = 1e-9
 """Sine of the angle between two axes below which they are one."""
-_ARM = ArmHand(target=())
-_OF_ARM = ("mass", "stiffness", "damping", "grip_stiffness", "grip_damping")
+_ARM, _COUPLING = ArmHand(target=()), Teleoperation()
 ON_JOINTS = ("stiffness", "rest", "damping", "friction", "limits", "drive")
 """Keys that act on the coordinate of a joint."""
 TURNED_ROUND = 1e-9
@@ -24,10 +25,27 @@ TURNED_ROUND = 1e-9
 
 
 def check_space(scene: Scene) -> Iterator[Problem]:
-    if scene.linkage is None or scene.linkage.dimension == 2:
+    if scene.linkage is None:
         return
-    linkage = scene.linkage
-    yield from _of_the_plane(scene, linkage)
+    for user, device in scene.all_devices.items():
+        if device.space != scene.linkage.space:
+            yield ("devices", user) if user else ("device",), _misfit(scene.linkage, device)
+    if scene.linkage.dimension > 2:
+        yield from _of_the_plane(scene, scene.linkage)
+        yield from check_joints_and_inertias(scene.linkage)
+
+
+def _misfit(linkage: Linkage, device: Device) -> str:
+    """What is wrong with a device and a linkage of which one is of the plane."""
+    spatial = linkage.spatial or device.linkage.spatial
+    if linkage.spatial:
+        remedy = 'take one in space, extends = "ideal-3", or take it out'
+        return f"is of the plane, and {spatial} put the linkage in space: {remedy}"
+    return f"is in space, by {spatial}, and the linkage is of the plane: take a planar one"
+
+
+def check_joints_and_inertias(linkage: Linkage) -> Iterator[Problem]:
+    """Problems of a linkage in space."""
     kinds: tuple[tuple[str, Sequence[Joint | Loop], object], ...] = (
         ("joint", linkage.joint, TreeType),
         ("loop", linkage.loop, CutType),
@@ -97,18 +115,22 @@ def _inertia(path: Path, moments: tuple[float, ...]) -> Iterator[Problem]:
         )
 
 
+def _defaults(here: Path, given: object, default: ArmHand | Teleoperation) -> Iterator[Problem]:
+    """Problems of a record with gains by direction that the scene has not given."""
+    for key, value in vars(default).items() if isinstance(given, type(default)) else ():
+        if isinstance(value, tuple) and value and getattr(given, key) == value:
+            text = "the default is of the plane, with a moment: give three numbers for x, y, z"
+            yield (*here, key), text
+
+
 def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
-    """What a scene with a linkage in space cannot have yet."""
-    for key in ("device", "devices", "controller", "controllers"):
-        if getattr(scene, key):
-            text = "renders a planar linkage: take it out, as one in space runs with hands alone"
-            yield (key,), f"{text}; here {linkage.spatial} put it in space"
+    """What a scene with a linkage in space cannot have."""
     for user, hand in scene.all_hands.items():
         here: Path = ("hands", user) if user else ("hand",)
-        for key in _OF_ARM if isinstance(hand, ArmHand) else ():
-            if getattr(hand, key) == getattr(_ARM, key):
-                text = "the default is of the plane, with a moment: give three numbers for x, y, z"
-                yield (*here, key), text
+        yield from _defaults(here, hand, _ARM)
+    for user, controller in scene.all_controllers.items():
+        table: Path = ("controllers", user) if user in scene.controllers else ("controller",)
+        yield from _defaults((*table, "teleoperation"), controller.teleoperation, _COUPLING)
     if scene.contacts:
         text = "are of the plane: a linkage in space has none, take them out"
         yield ("contacts",), f"{text}; here {linkage.spatial} put it in space"

@@ -83,12 +83,17 @@ def test_a_motion_of_a_hand_is_no_shaking(hertz: float, amplitude: float) -> Non
     assert found.amplitude < FAINTEST / 2
 
 
-def test_shaking_that_lasts_for_a_while_is_found_where_it_is() -> None:
-    v = velocities(80.0, 0.4) * ((TIME > 1.7) & (TIME < 1.96))
-    found = shaking(TIME, v + velocities(1.0, 3.0))
+@pytest.mark.parametrize("before", [0, 6], ids=["at once", "late in a long run"])
+def test_shaking_that_lasts_for_a_while_is_found_where_it_is(before: int) -> None:
+    """And what is no number, as of a run that diverges, is no shaking."""
+    periods = velocities(1.0, 3.0)[:, :-1]
+    v = np.tile(periods, before + 1)
+    v[:, -periods.shape[1] :] += (velocities(80.0, 0.4) * ((TIME > 1.7) & (TIME < 1.96)))[:, :-1]
+    v = np.hstack([v, np.full((2, 512), np.nan)])
+    found = shaking(T * np.arange(v.shape[1]), v)
     assert found is not None
     assert found.amplitude == pytest.approx(0.4, rel=0.1)
-    assert found.time == pytest.approx(1.83, abs=0.05)
+    assert found.time == pytest.approx(1.83 + 2.0 * before, abs=0.05)
 
 
 @pytest.mark.parametrize("time", [TIME[:100], TIME[::8]], ids=["short", "seldom"])

@@ -8,10 +8,12 @@ import shlex
 import xml.etree.ElementTree as ET
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from typing import Any, NoReturn
 from unittest.mock import Mock
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -27,6 +29,7 @@ from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, _Searc
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import DRIFT, kind, modes
 from hapticlink.analysis.stability.poses import (
+    Pose,
     at_pose,
     choose_evenly_spaced,
     find_rest_poses,
@@ -39,6 +42,8 @@ from hapticlink.analysis.stability.smooth_scene import linearisable, with_quicke
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.commands.progress import steps
 from hapticlink.components.blocks.start_settings import without_start_values
+from hapticlink.components.device.models import device_model
+from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, SpringHand
 from hapticlink.fmus.blocks import find_block, has_compiled
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault, Interrupted
@@ -231,6 +236,39 @@ def test_a_margin_is_told_on_its_safe_side_and_as_far_as_it_was_searched(
 ) -> None:
     """512/35 = 14.63: at 14.6 Hz it is unstable."""
     assert ", ".join(Stability._margins(Mock(margin=margin))) == told
+
+
+def test_motors_at_their_limit_leave_the_hand_the_bare_device() -> None:
+    """A grip of 30 N.s/m and 4,000 N/m that is sampled holds the device's mass M alone: v and x
+    after a step with a constant force are v + T a and x + T v + T^2/2 a, a = -M^-1 (b v + k x). The
+    arm behind the grip moves little."""
+    joints = dict(shoulder1=3.445051, elbow1=-0.944812, shoulder2=-3.311094, elbow2=6.283920)
+    scene = {"device.extends": "pantograph-mk-ii", "controller.bias": "full", "graphics.rate": 512}
+    read = hl.scene("closed-loop-ideal", scene)
+    point = (-0.056908, 1.3e-5, 2.500239)  # where the linkage is stretched
+    pose = Pose(0.0, joints, point, (-0.5, 0.0, 0.0), title="pulled")
+    stiff = "stiff arm, firm grip"
+    (case,), _ = in_poses(read, [pose], {stiff: HANDS[stiff]}, DRIFT)
+    assert case.saturated
+    assert case.hertz == 256.0
+    M = np.array(hand_mass(read.device, point))
+    T, k, b, one = 1 / 512, 4000.0, 30.0, np.eye(2)
+    a = np.linalg.inv(M)
+    step = np.block(
+        [[one - a * b * T, -a * k * T], [one * T - a * b * T**2 / 2, one - a * k * T**2 / 2]]
+    )
+    growth = np.log(np.abs(np.linalg.eigvals(step)).max()) / T
+    assert case.growth == pytest.approx(growth, rel=0.01)
+    told = Mock(cases=[case], worst=case, _margins=list, remedies=(), without={})
+    assert "at pulled motors are at their limit" in [*islice(Stability._below(told), 2)][1]
+
+
+def hand_mass(device: Device | None, point: tuple[float, ...]) -> ca.DM:
+    """The mass matrix (kg) of a device's point."""
+    assert device
+    model, x = device_model(device), ca.SX.sym("x", 3)
+    M, _ = model.motion(model.place_at_pose(x), ca.SX(2, 1), model.numbers)
+    return ca.Function("M", [x], [M])(point)
 
 
 @pytest.mark.parametrize(

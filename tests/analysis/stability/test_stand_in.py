@@ -89,12 +89,33 @@ def test_what_the_response_does_not_tell_is_refused_with_the_reason(law: Law, wh
         identify(responding(law), np.array([0.01, 0.01]), ["a", "b"])
 
 
-def spring(folder: Path, force: str, **options: Any) -> dict[str, Any]:
+@pytest.mark.parametrize(
+    ("law", "early", "on_run"),
+    [
+        (lambda e, t, own: K * e, 0.0, 0.0),
+        (lead_lag, 0.0, 0.0),
+        # half as stiff for its first 100 steps
+        (lambda e, t, own: (K if t > 100 * T else K / 2) * e, 0.5, 0.5),
+        # limited to half of what the run asks of it
+        (lambda e, t, own: max(-5.0, min(5.0, K * e)), 0.0, 1.0),
+    ],
+)
+def test_a_law_that_changes_early_or_with_size_is_found_out(
+    law: Law, early: float, on_run: float
+) -> None:
+    run = np.stack([0.1 * np.sin(0.1 * np.arange(200.0)), np.zeros(200)], axis=1)
+    found = identify(responding(law), np.array([0.01, 0.01]), ["a", "b"], run)
+    assert found.error < 1e-8
+    assert (found.early, found.on_run) == pytest.approx((early, on_run), rel=0.3, abs=1e-8)
+
+
+def spring(folder: Path, force: str, ports: str = "x", **options: Any) -> dict[str, Any]:
     """Options with an FMU of Python in the place of the hand, which hides its memory."""
+    inputs = {name: 0.0 for port in ports for name in entries(port, 3)}
     body = f"""own = self.__dict__.setdefault("own", {{}})
         e = -values["x[1]"]
         values["F[1]"] = {force}"""
-    path = slave(folder, "Law", ("input", entries("x", 3)), ("output", entries("F", 3)), body=body)
+    path = slave(folder, "Law", ("input", inputs), ("output", entries("F", 3)), body=body)
     start = {"linkage.start": {"rail": 0.0}}
     return {"fmu": [{"replaces": "hand", "path": str(path), **options}], **start}
 
@@ -128,7 +149,29 @@ def test_the_verdict_says_what_stands_for_the_fmu_and_how_exact_it_is(tmp_path: 
     (each,) = verdict.record()["stand_ins"]
     assert (each["fmu"], each["order"]) == ("hand", 0)
     assert each["error"] < 1e-9
+    assert max(each["early"], each["on_run"]) < 1e-9
     assert "hand: its state cannot be read; a linear system of order 0 stands" in str(verdict)
+
+
+@pytest.mark.parametrize(
+    ("force", "says"),
+    [
+        ("100.0 * e", ()),
+        ("(100.0 if time > 1.0 else 50.0) * e", ("in its first 512 steps the FMU is another",)),
+        ("max(-0.1, min(0.1, 100.0 * e))", ("over that run the FMU is not this system",)),
+    ],
+)
+def test_the_verdict_says_where_the_fmu_is_another_system(
+    tmp_path: Path, force: str, says: tuple[str, ...]
+) -> None:
+    """The mass starts at rest .01 m from where the spring is relaxed."""
+    given = spring(tmp_path, f"{force} - 5.0 * values['v[1]']", "xv") | {"haptics.rate": 64}
+    given["linkage.start"] = {"rail": 0.01}
+    verdict = hl.equilibrium_stability("sampled-spring", given)
+    every = ("in its first 512 steps the FMU is another", "over that run the FMU is not this")
+    assert tuple(each for each in every if each in str(verdict)) == tuple(
+        each for each in every if any(one.startswith(each) for one in says)
+    )
 
 
 def test_a_parameter_that_changes_takes_another_system(tmp_path: Path) -> None:

@@ -84,3 +84,14 @@ def test_the_wrench_of_the_other_hand_is_no_contact() -> None:
     poses = choose_evenly_spaced(simulate_scene(scene), scene.linkage, 2)
     assert [pose.name for pose in poses] == ["0 s", "0.0469 s"]
     assert not any(any(pose.press) for pose in poses)
+
+
+def test_the_other_users_force_is_no_contact() -> None:
+    """The left user pulls, and the walls are 2.6 mm away."""
+    walls = [[-0.03, -0.045], [0.068, -0.045], [0.068, 0.036], [-0.03, 0.036]]
+    room = {"contacts": {"enclosure": walls, "stiffness": 1000.0, "damping": 10.0}}
+    pull = {"hands.left.target": [[0.0, 0.034707, -0.011319, 0.314]]}
+    with resting("two-users", OPTIONS | room | pull) as found:
+        assert abs(found.signal("virtual_mechanism.F_env")).max() > 0.01
+        assert found.signal("virtual_mechanism.contact_gap") > 1e-3
+        assert not found.contact.any()

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -351,6 +352,28 @@ def test_a_crashed_process_takes_one_run(foreign: Path, tmp_path: Path) -> None:
     assert len(list((out / "rows").iterdir())) == 2  # the next sweep tries the dead one again
 
 
+def pids(batch: pool.Batch) -> list[row.Row]:
+    if batch[0].key == "dies":
+        os.kill(os.getpid(), signal.SIGKILL)
+    return [{"pid": os.getpid()} for _ in batch]
+
+
+def test_processes_are_kept_for_further_rounds_and_replaced_where_one_dies() -> None:
+    def round_of(*keys: str) -> list[object]:
+        batches = [[Job({}, None, key)] for key in keys]
+        return [made.get("pid") for _, made in pool.in_processes(pids, batches, 1)]
+
+    with pool.keep_processes():
+        (first,), again = round_of("a"), round_of("b", "c")
+        assert again == [first, first]
+        assert round_of("dies") == [None]
+        (new,) = round_of("a")
+        assert new != first
+        assert round_of("b") == [new]
+    assert round_of("a") != [new]
+    assert not multiprocessing.active_children()
+
+
 def test_what_fails_for_the_machine_is_made_again_and_what_the_scene_gives_is_not(
     tmp_path: Path,
 ) -> None:
@@ -565,3 +588,16 @@ def test_ctrl_c_ends_a_sweep_while_its_points_are_read() -> None:
 
 def test_the_run_time_is_the_last_column():
     assert table.columns([{"run_time_s": 1.0, "b": 2.0}, {"a": 3.0}]) == ["b", "a", "run_time_s"]
+
+
+def test_points_of_one_rate_are_in_one_batch() -> None:
+    """Whichever key varies first; a refused point is in one of them."""
+    rates = ("20", "30", "nothing", "40")
+    points = [
+        {"graphics.rate": rate, "hand.wrench": f"[{x}, 0, 0]"} for x in range(8) for rate in rates
+    ]
+    jobs = points_of.jobs("closed-loop-ideal", (), points)
+    batches = run_sweep.batches_of(jobs, 1)
+    assert [len({job.point["graphics.rate"] for job in batch}) for batch in batches] == [1] * 4
+    assert sorted(map(id, jobs)) == sorted(id(job) for batch in batches for job in batch)
+    assert [len(batch) for batch in run_sweep.batches_of(jobs, 4)] == [2] * 16

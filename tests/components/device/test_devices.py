@@ -15,11 +15,12 @@ from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.joint_coordinates import JointCoordinates
 from hapticlink.components.device.models import device_model
 from hapticlink.components.device.pose_coordinates import PoseCoordinates
-from hapticlink.components.device.workspace import extent_along, margin, workspace
+from hapticlink.components.device.workspace import extents_along, margin, workspace
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
 from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Handle, Observer
+from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene.device_files import list_devices
 from tests.blocks import Running
 from tests.devices import device
@@ -33,6 +34,7 @@ KINDS = {
     "pantograph-mk-ii": PoseCoordinates,
     "stage": JointCoordinates,
     "paddle": JointCoordinates,
+    "ideal-3": JointCoordinates,
 }
 RANGED = {"joint.a_left.range": [0.5, 4.0]}
 
@@ -88,10 +90,11 @@ def test_the_inertia_is_that_of_the_kinetic_energy(name):
     model, p = device_model(spec), device_model(spec).numbers
     n, k = len(model.start_place), model.directions.size
     z, y = ca.SX.sym("z", n), ca.SX.sym("v", k)
-    frames = model.frames(z, p)
+    frames, d = model.frames(z, p), spec.linkage.dimension
+    centers = {b.name: ca.SX(ca.DM([*(b.center or (0.0, 0.0)), 0.0][:d])) for b in spec.body}
     parts = [
-        ca.vertcat(frames[b.name].point(p.get(f"{b.name}.center")), frames[b.name].angle)
-        for b in spec.body
+        ca.horzcat(frames[name].point(center), frames[name].rotation)
+        for name, center in centers.items()
     ]
     placed = ca.Function("placed", [z], [ca.horzcat(*parts), model.motor_angles(z, p)])
     moved = ca.Function("moved", [z, y], [model.moved(z, y, p)])
@@ -99,12 +102,17 @@ def test_the_inertia_is_that_of_the_kinetic_energy(name):
     v, small = np.array([0.3, -0.2, 2.0])[:k], 1e-6
     after, before = (moved(model.start_place, way * small * v) for way in (1, -1))
     (bodies, rotors), (bodies0, rotors0) = placed(after), placed(before)
-    rates = (np.array(bodies) - np.array(bodies0)) / (2 * small)
+    rates = np.split((np.array(bodies) - np.array(bodies0)) / (2 * small), len(centers), axis=1)
+    at = np.split(np.array(placed(model.start_place)[0]), len(centers), axis=1)
     spins = (np.array(rotors) - np.array(rotors0)).ravel() / (2 * small)
-    twice = sum(
-        b.mass * (r[0] ** 2 + r[1] ** 2) + b.inertia * r[2] ** 2
-        for b, r in zip(spec.body, rates.T, strict=True)
-    )
+    twice = 0.0
+    for body, rate, placement in zip(spec.linkage.body, rates, at, strict=True):
+        turned = placement[:, 1:].T @ rate[:, 1:]  # [omega] in the body's axes
+        omega = np.zeros(3)
+        omega[2] = turned[1, 0]
+        if d == 3:
+            omega[:2] = turned[2, 1], turned[0, 2]
+        twice += body.mass * rate[:, 0] @ rate[:, 0] + omega @ body.inertia_tensor @ omega
     twice += sum(m.inertia * spin**2 for m, spin in zip(spec.motors, spins, strict=True))
     M, C = (np.array(value) for value in dynamics(model.start_place, v))
     assert v @ M @ v == pytest.approx(twice, rel=1e-6)
@@ -129,7 +137,7 @@ def test_the_workspace_of_a_stage_is_its_ranges_and_that_of_a_paddle_its_arc():
         pytest.approx((-0.12, 0.12)),
     )
     assert margin(stage, np.array([[0.1, -0.115, 2.0]])) == pytest.approx([0.005])
-    assert extent_along(paddle) == pytest.approx(
+    assert extents_along(paddle)[0] == pytest.approx(
         [-0.07 * np.sin(0.8), 0.07 * np.sin(0.8)], abs=1e-4
     )
     assert margin(paddle, np.array([[0.2, 0.0, 0.0]]))[0] < 0  # farther than its lever
@@ -245,3 +253,25 @@ def test_a_free_hand_that_pulls_hard_leaves_all_finite(name, hand):
         out = min(out, plant.y["workspace_margin"])
         assert np.isfinite(plant.x).all()
     assert out < -0.02
+
+
+def test_the_pantograph_is_isotropic_where_its_paper_says():
+    """Campion, Wang, Hayward 2005, equation (23): at cos(theta_1) = -25/126 + 25 sqrt(2)/42 the
+    motors' rates turn into velocities of one size in all directions; at about (-12.5, 101.2) mm of
+    the first motor, whose x axis is the other way round."""
+    pantograph = device("pantograph-mk-ii")
+    found = At(device_model(pantograph))
+    cosine = -25 / 126 + 25 * np.sqrt(2) / 42
+    y = 0.063 * np.sqrt(1 - cosine**2) + 0.075 / np.sqrt(2)
+    assert y == pytest.approx(0.1012, abs=1e-4)
+    pose = [0.0, y + pantograph.base[1], 0.0]
+    sizes = np.linalg.svd(found(pose, [0.0, 0.0])[-2])[1]
+    assert sizes[0] / sizes[1] == pytest.approx(1.0, abs=1e-12)
+    assert found(pose, [0.0, 0.0])[-3][0, 0] == pytest.approx(np.pi - np.arccos(cosine), abs=1e-12)
+
+
+def test_origins_of_numbers_are_told_by_their_words():
+    for name in list_devices():
+        assert all(vars(device(name).origin).values())
+    with pytest.raises(InputFault, match="origin: masses = 'guessed' begins with none of printed"):
+        device("2diy", {"origin.masses": "guessed"})

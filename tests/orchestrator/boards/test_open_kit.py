@@ -4,12 +4,15 @@ the firmware's source (Haply_Arduino_Firmware 1.5.0, setup_device, write_states,
 from __future__ import annotations
 
 import math
+import os
+import socket
 import sys
+import threading
 
 import pytest
 
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.boards.driver import Silent
+from hapticlink.orchestrator.boards.driver import SOCKET, Silent
 from hapticlink.orchestrator.boards.open_kit import OpenKit
 from hapticlink.orchestrator.boards.simulated_board import WATCHDOG, Firmware
 from tests.orchestrator.boards.kits import TWO_MOTORS, Port, Still, kit
@@ -107,6 +110,35 @@ def test_a_board_that_lost_bytes_takes_three_messages_of_zero_as_no_torque() -> 
         board = Firmware(Still())
         board.take(RESET + SET_UP + TORQUES + TORQUES[cut:] + 3 * zero, 0.0)
         assert max(map(abs, board.torques)) < 1e-30, cut
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a pseudo-terminal stands for the serial port")
+@pytest.mark.parametrize("kind", ["terminal", "socket"])
+def test_a_port_of_this_computer(kind: str) -> None:
+    """Serial ports, and boards behind a socket, by the bytes that come out of them."""
+    if kind == "terminal":
+        board, other = os.openpty()
+        port = os.ttyname(other)
+    else:
+        server = socket.create_server(("127.0.0.1", 0))
+        port = f"{SOCKET}127.0.0.1:{server.getsockname()[1]}"
+    firmware = Firmware(Still())
+
+    def serve() -> None:
+        end = server.accept()[0].detach() if kind == "socket" else board
+        while firmware.messages < 2:
+            os.write(end, firmware.take(os.read(end, 100), 0.0))
+
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    driver = OpenKit(port, TWO_MOTORS)
+    driver.open()
+    for torques in ([0.1, -0.05], [0.0, 0.0]):
+        driver.send(torques)
+        assert driver.receive(5.0) == [-90.0, 12.0]
+    thread.join()
+    driver.close()
+    assert not any(firmware.torques)
 
 
 def test_a_port_that_is_not_there_and_a_missing_package(monkeypatch) -> None:

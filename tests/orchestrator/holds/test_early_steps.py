@@ -120,11 +120,20 @@ def test_reaction_is_the_mean_effort_of_what_gives_way_as_it_did(seed):
 
 @few
 @given(seeds)
-def test_reaction_to_nothing_is_half_lead(seed):
-    rng = np.random.default_rng(seed)
-    F, still = rng.normal(size=(9, N)), np.ones((9, N))
-    found, _ = reacting(rng, N, F, still, 0 * still, np.eye(N))
-    np.testing.assert_allclose(found, F[-1] + (F[-1] - F.mean(axis=0)) / 2, rtol=1e-12)
+def test_reaction_to_motions_far_below_10_um_is_half_lead(seed):
+    """A hand of 300 N/m, of which it finds the less the smaller its motions are."""
+    rest, H = np.random.default_rng(seed).normal(size=(9, N)), 24 * float(BASE)
+
+    def share(size):
+        """Of the hand's stiffness, by what the value gives way to the velocity that follows."""
+        x = size * rest
+        found, v = reacting(np.random.default_rng(seed), N, -300 * x, x, 0 * x, np.zeros((N, N)))
+        gives_way = -300 * (x[-1] + (x[-1] - x.mean(axis=0)) / 2) - found
+        return np.abs(gives_way / (300 * v * H / 2)).max()
+
+    assert share(1e-8) < 1e-4
+    assert share(1e-7) < 1e-2
+    assert share(1e-4) > 0.3
 
 
 def mid(rng, n, K, B, mobility):

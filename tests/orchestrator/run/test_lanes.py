@@ -1,5 +1,6 @@
 """Runs side by side, with the steps of FMUs at once, give what single runs give, to the byte."""
 
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -63,13 +64,23 @@ def test_runs_that_end_early_or_fail_are_taken_out(
     assert counts == [3, 3]
 
 
-def test_points_with_other_events_run_alone(
+def test_points_of_the_same_events_go_together(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """Holds, seeds of latencies and of noise have the same events; those of rates have not."""
     counts = count_steps(monkeypatch)
-    options = [*WRENCHES[:2], "graphics.rate=20", "hold=foh"]
-    compare("closed-loop-ideal", [(*BASE, option) for option in options], tmp_path)
-    assert counts == [2, 2]
+    crossing = 'delays."virtual_mechanism.x"={ min = 0.01, max = 0.05, loss = 0.1, seed = '
+    noise = 'at=[{ time = 0.05, noise = { "controller.x_D" = 0.001 }, seed = '
+    rate = "graphics.rate={ min = 20, max = 50, seed = "
+    groups = [
+        ["hold=zoh", "hold=foh", "hold=passive"],
+        [f"{crossing}{seed} }}" for seed in (1, 2)],
+        [f"{noise}{seed} }}]" for seed in (1, 2)],
+        [f"{rate}1 }}", f"{rate}2 }}", "graphics.rate=20"],
+    ]
+    options = [option for group in zip_longest(*groups) for option in group if option]
+    compare("closed-loop-direct", [(*BASE, option) for option in options], tmp_path)
+    assert counts == [7, 7]
 
 
 @pytest.mark.slow

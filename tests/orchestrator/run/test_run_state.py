@@ -3,6 +3,7 @@ fit is refused by name."""
 
 import csv
 import json
+import signal
 import subprocess
 import sys
 import time
@@ -170,6 +171,15 @@ def test_what_does_not_fit_is_refused_by_name(small, options, why):
     assert why in str(refused.value)
 
 
+def test_a_shorter_run_is_no_other_rate(small):
+    """Its clocks stop before the state's, which is not said of them as well."""
+    with pytest.raises(InputFault) as refused:
+        hl.run(small, {"duration": 0.2})
+    _, ends, differ = str(refused.value).splitlines()
+    assert ends.strip().startswith("the run ends at")
+    assert differ.strip() == "settings that differ: duration = 0.2 (0.8 in the state)"
+
+
 @pytest.mark.parametrize(
     ("change", "why"),
     [
@@ -313,22 +323,23 @@ KILLED = 25
 
 
 def test_a_run_that_is_killed_at_any_time_goes_on_from_its_last_state(tmp_path):
-    """SIGKILL after a random time of a run that saves its state ten times a second."""
-    whole, drawn = tmp_path / "whole", np.random.default_rng(46)
+    """SIGKILL after a random time, once the first state is there, of a run that saves its state ten
+    times a second."""
+    whole, drawn, went_on = tmp_path / "whole", np.random.default_rng(46), 0
     options = ["--set", "duration=60", "--set", "packaging=native", "--set", "record.every=7"]
-    begun = time.perf_counter()
     assert process(*options, "--out", str(whole)).wait() == 0
-    took, went_on = time.perf_counter() - begun, 0
     for attempt in range(4 * KILLED):
         if went_on == KILLED:
             break
         first, later = (tmp_path / f"{name}{attempt}" for name in ("first", "later"))
         running = process(*options, "--save", "every=0.1", "--out", str(first))
-        time.sleep(float(drawn.uniform(0.3, 1.0)) * took)
+        state = first / "last.state"
+        while running.poll() is None and not state.exists():
+            time.sleep(0.001)
+        time.sleep(float(drawn.uniform(0.0, 0.6)))
         running.kill()
-        running.wait()
-        if not (state := first / "last.state").exists():
-            continue  # killed before the first one: there is nothing to go on from
+        if running.wait() != -signal.SIGKILL:
+            continue  # it had ended
         recover(first)
         found = hl.run(state, out=later, figures=False)
         assert found.fault is None

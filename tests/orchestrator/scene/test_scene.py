@@ -9,7 +9,7 @@ from hapticlink.orchestrator.base.errors import SceneFault
 from hapticlink.orchestrator.scene import find_scene, read_and_check
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
-from hapticlink.orchestrator.scene.toml_keys import key_lines
+from hapticlink.orchestrator.scene.toml_keys import read_document
 
 GOOD = """title = "A bar"
 duration = 1.0
@@ -133,7 +133,9 @@ def test_not_toml():
 def test_lines_of_keys_after_texts_and_arrays_over_several_lines():
     text = 'a = """\n[x]\nb = 1\n"""\nc.d = [\n  1, # ]\n  2]\n'
     text += '[t]\ne = {f = 1}\n[[s]]\n[[s]]\n"g.h"=1\n'
-    lines = key_lines(text)
+    tables, lines = read_document(text)
+    tables.clear()  # its reader's own
+    assert read_document(text)[0]["t"] == {"e": {"f": 1}}
     assert lines == {
         ("a",): 1, ("c",): 5, ("c", "d"): 5, ("t",): 8, ("t", "e"): 9,
         ("s",): 10, ("s", 0): 10, ("s", 1): 11, ("s", 1, "g.h"): 12,

@@ -41,6 +41,10 @@ ROD = (
 )
 CUT = "linkage.loop.+={ bodies = ['bar', 'block'], at = [[0, 0, 0], [0, 0, 0]]%s }"
 HOOKE = "linkage.joint.ball={ name = 'ball', type = 'universal', child = 'bar'%s }"
+DEVICE = (
+    "device={ body = [{ name = 'a', mass = 1, inertia = 1 }], handle = { body = 'a' }, %s, "
+    "joint = [{ name = 'j', child = 'a', axis = [0, 0, 0] }] }"
+)
 REFUSED = [
     ("linkage.joint.slide.axis=[0, 0, 0]", "linkage.joint[1] (slide).axis: [0.0, 0.0, 0.0] has no"),
     ("linkage.joint.slide.axis=0.5", "an angle is of the plane: give three numbers as axis"),
@@ -60,8 +64,10 @@ REFUSED = [
     ("linkage.body.bar.inertia=[0.1, 0.02, 0.02]", "no body has the principal moments 0.02, 0.02,"),
     ("linkage.body.bar.radius=0.1", "is a shape of the plane, and in space nothing touches"),
     ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
-    ("controller={}", "controller: renders a planar linkage"),
-    ("device={}", "hands alone; here a spherical joint put it in space"),
+    ("device={}", "device: is of the plane, and a spherical joint put the linkage in space: take"),
+    ("device={ extends = 'ideal-3', handle = { angle = 'free' } }", "of three forces: take it out"),
+    (DEVICE % "loop = [{ bodies = ['a', 'ground'], at = [[0, 0], [0, 0]] }]", "take a rod, which"),
+    (DEVICE % "base = [0, 0, 1]", "device.joint[0] (j).axis: [0.0, 0.0, 0.0] has no length"),
     ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
     ("local_model=true", "local_model: is of the plane: leave it out"),
 ]
@@ -91,5 +97,19 @@ def test_refused(option, message):
 def test_a_planar_scene_is_told_what_put_it_in_space(option, cause):
     with pytest.raises(InputFault) as refused:
         open_scene.load("closed-loop-ideal", [option])
-    assert "device: renders a planar linkage: take it out" in str(refused.value)
-    assert f"here {cause} put it in space" in str(refused.value)
+    assert f"device: is of the plane, and {cause} put the linkage in space" in str(refused.value)
+    assert 'take one in space, extends = "ideal-3", or take it out' in str(refused.value)
+
+
+def test_a_device_in_space_does_not_render_a_planar_linkage():
+    with pytest.raises(InputFault) as refused:
+        open_scene.load("closed-loop-ideal", ["device.extends=ideal-3"])
+    said = "device: is in space, by three numbers of axis, and the linkage is of the plane: take a"
+    assert said in str(refused.value)
+
+
+def test_gains_of_the_plane_are_no_defaults_in_space():
+    with pytest.raises(InputFault) as refused:
+        read_and_check.read_scene(SCENE, ["device.extends=ideal-3", "controller={}"])
+    said = "controller.teleoperation.stiffness: the default is of the plane, with a moment: give th"
+    assert said in str(refused.value)

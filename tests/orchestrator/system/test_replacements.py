@@ -1,5 +1,6 @@
 """FMUs in the place of blocks."""
 
+import csv
 import json
 from pathlib import Path
 
@@ -67,6 +68,37 @@ def test_a_block_s_own_fmu_in_its_place_changes_no_byte(tmp_path, own_files, own
     assert swapped.run["connections"] == own_run.run["connections"]
     assert swapped.run["stop_when"] == own_run.run["stop_when"] != ""
     assert tables_of(own_run.folder) == tables_of(tmp_path)
+
+
+def test_a_parameter_of_a_controller_of_ones_own_is_swept(tmp_path):
+    """As the scene's own controller with twice the stiffness: a swap is one for each point."""
+    inputs = entries("x_S", 3) | entries("x_D", 3)
+    body = """for i in (1, 2, 3):
+            stretch = values[f"x_S[{i}]"] - values[f"x_D[{i}]"]
+            values[f"F_drift[{i}]"] = values[f"F_motor[{i}]"] = values["k"] * stretch"""
+    variables = ("input", inputs), ("tunable", {"k": 50.0})
+    outputs = ("output", entries("F_motor", 3) | entries("F_drift", 3))
+    file = slave(tmp_path, "Gain", *variables, outputs, body=body)
+    command = [
+        "sweep",
+        "closed-loop-ideal",
+        "--set",
+        "duration=0.2",
+        "--swap",
+        f"controller={file}",
+    ]
+    vary = ["--vary", "fmu.controller.start.k=50,100", "--jobs", "1"]
+    assert status(*command, *vary, "--out", tmp_path / "swept") == 0
+    with (tmp_path / "swept" / "table.csv").open() as table:
+        rows = {row["fmu.controller.start.k"]: row for row in csv.DictReader(table)}
+    for k in ("50", "100"):
+        own = {"impedance": False, "topology": False, "teleoperation.damping": [0.0] * 3}
+        own |= {"teleoperation.stiffness": [float(k)] * 3}
+        options = {f"controller.{key}": value for key, value in own.items()}
+        found = hl.run("closed-loop-ideal", {"duration": 0.2, **options})
+        error = found.tracking().distance_mm.max()
+        assert float(rows[k]["tracking_max_mm"]) == pytest.approx(error, rel=1e-6)
+    assert rows["50"]["tracking_max_mm"] != rows["100"]["tracking_max_mm"]
 
 
 def test_by_one_option_and_what_does_not_meet_is_listed(tmp_path, capsys):
@@ -274,6 +306,8 @@ def test_signs_and_factors_of_a_map_make_it_the_same_law(tmp_path, packaging):
     [
         ("F=0*force0,force1,force2", "0*force0: a factor is a finite number other than 0"),
         ("F=1e999*force0,force1,force2", "a factor is a finite number other than 0"),
+        ("F=-force{0,1,2", "-force{0: a brace without its other, or an empty entry: write a list"),
+        ("F=force{0,,2}", "force{0,,2}: a brace without its other, or an empty entry"),
         ("F=force{0,1}", "2 variables for the 3 entries of F"),
         ("F=force0+1,force1,force2", "no variable of the FMU 'force0+1'"),
         (

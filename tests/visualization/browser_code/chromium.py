@@ -100,6 +100,25 @@ def differ_without_topology(page: Page) -> None:
     assert " | " in said
 
 
+REAL_TIME_FACTOR = (
+    "document.querySelector('label:has([data-control=\"speed\"]) output').textContent"
+)
+
+
+def assert_slow_motion(page: Page, factor: float) -> None:
+    """Simulated time goes on, and by no more than this share of the clock's: a loaded machine is
+    slower still."""
+    page.until(f"{REAL_TIME_FACTOR} === '{factor:g}×'")
+    page.run_for(0.001)
+    clock, simulated = page.get(
+        """new Promise((done) => {
+          const [clock, time] = [performance.now(), view.frame.t];
+          setTimeout(() => done([(performance.now() - clock) / 1e3, view.frame.t - time]), 1500);
+        })"""
+    )
+    assert 0 < simulated < factor * clock + 0.02
+
+
 COLLECT = """() => {
   view.seen = [];
   setInterval(() => {
@@ -125,6 +144,10 @@ def has_its_first_minute(page: Page) -> None:
     """Pulled at 60 Hz the linkage is steady, at 11 Hz it vibrates, and with a softer coupling at
     that rate it does not: as the page says, and as the frames have it."""
     page.until("!document.getElementById('first').hidden")
+    assert page.get("document.getElementById('ends').innerText.split(/\\s*\\n/)") == [
+        "10 Hz",
+        "60 Hz",
+    ]
     page.page.evaluate(COLLECT)
     pressed = "document.getElementById('remedy').ariaPressed === "
     rate = "document.getElementById('hertz').textContent === "

@@ -182,6 +182,9 @@ def test_lines_of_a_title_are_even_and_keep_numbers_with_their_units() -> None:
         ("linkage.body.link0.mass", "mass of link0 (kg)"),
         ("hold", "hold"),
         ("mechanism_at", "mechanism at"),
+        ("fmu.wall.start.damping", "damping of wall"),
+        ('delays."wall.F"', "delay of wall.F (s)"),
+        ("delays.hand.F", "delay of hand.F (s)"),
     ],
 )
 def test_axes_of_a_sweep_are_in_words(key: str, label: str) -> None:

@@ -151,6 +151,20 @@ def test_it_is_steady_only_in_a_hand() -> None:
     assert [light for _, light in found] == ["", "", "green", "red", "red", "red"]
 
 
+@pytest.mark.parametrize("stiffness", [1e3, 1e12])
+def test_a_run_that_grew_beyond_all_bounds_is_told_so(stiffness: float) -> None:
+    """By the message of its fault: an output beyond a bound, or a state that became nan."""
+    gains = {"controller.teleoperation.stiffness": [stiffness, stiffness, 0.1]}
+    run = hl.run(SERVED, gains | {"graphics.rate": 10}, figures=False)
+    (said, _), (other, _) = javascript(
+        "first_minute.js",
+        "answer = given.map((why) => felt(null, [0], true, why));",
+        [run.fault, "the device left its workspace"],
+    )
+    assert said.startswith("The motion grew beyond all bounds")
+    assert other.startswith("The run has ended")
+
+
 def test_a_run_that_begins_anew_has_not_swung() -> None:
     again = SWUNG + "swings.add(0, [0, 0]); answer = swings.vibration;"
     assert javascript("swings.js", again, {"hertz": 5, "mm": 6, "drift": 0}) is None

@@ -5,7 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.visualization.browser_code.chromium import Page
+from tests.visualization.browser_code.chromium import (
+    REAL_TIME_FACTOR,
+    Page,
+    assert_slow_motion,
+)
 from tests.visualization.browser_code.served_page import CONSTRAINED, FREE, Served
 
 Window = Callable[..., Page]
@@ -124,6 +128,15 @@ def test_restore_sets_back_what_was_changed(served: Served, window: Window) -> N
     page.until(f"!{said}.includes(' 100 N/m') && {said}.includes('316')")
     page.page.click("#restore")
     page.until(f"{said}.includes('100 N/m')")
+
+
+def test_time_goes_as_slowly_as_the_slider_says(served: Served, window: Window) -> None:
+    page, other = window(served.url), window(served.url)
+    page.page.fill("[data-control='speed']", "0")
+    other.until(f"{REAL_TIME_FACTOR} === '0.05×'")
+    assert_slow_motion(page, 0.05)
+    page.page.click("#restore")
+    other.until(f"{REAL_TIME_FACTOR} === '1×'")
 
 
 def test_idle_charts_are_scaled_by_what_can_be_felt(served: Served, window: Window) -> None:

@@ -18,6 +18,7 @@ from tests.shared_fixtures import status
 from tests.visualization.browser_code.chromium import (
     AT,
     Page,
+    assert_slow_motion,
     differ_without_topology,
     has_its_first_minute,
 )
@@ -151,6 +152,18 @@ def test_a_link_carries_the_settings(file: Path, window: Window) -> None:
     again = window(link)
     again.until("!document.querySelector('[data-control=\"controller.topology\"]').checked")
     again.until("document.querySelector('#controls select').value === 'foh'")
+
+
+def test_time_goes_as_slowly_as_the_address_says(file: Path, window: Window) -> None:
+    """Both runs, where there are two."""
+    page = window(f"{file.as_uri()}#speed=0.05")
+    page.until("view.frame")
+    page.page.click("#compare")
+    page.until("view.frame?.b")
+    assert_slow_motion(page, 0.05)
+    assert page.get("view.frame.b.t") == page.get("view.frame.t")
+    page.page.click("#restore")
+    page.until("!location.hash.includes('speed')")
 
 
 def test_two_settings_run_under_one_mouse(file: Path, window: Window) -> None:
