@@ -167,7 +167,8 @@ def plate(name: str, end: Sequence[float], mass: float = 0.3) -> Body:
 def body(name: str, mass: float, tensor: Matrix, center: Matrix) -> Body:
     """A body with an inertia tensor about its centre of mass."""
     entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    inertia, at = (tuple(float(v) for v in of) for of in (entries, center))
+    inertia: Any = tuple(float(v) for v in entries)
+    at: Any = tuple(float(v) for v in center)
     return Body(name=name, mass=mass, inertia=inertia, center=at)
 
 
@@ -200,10 +201,10 @@ def closed(loop: tuple[list[Matrix], list[Matrix]]) -> Linkage:
         before: dict[str, Any] = {}
         if i:
             before = {"parent": f"rod{i - 1}", "at_parent": spans[i - 1]}
-        axis = tuple(axes[i].tolist())
+        axis: Any = tuple(axes[i].tolist())
         joints.append(Joint(name=f"joint{i}", child=f"rod{i}", axis=axis, **before))
-    last = tuple(axes[n - 1].tolist())
-    end = tuple(points[n - 1].tolist())
+    last: Any = tuple(axes[n - 1].tolist())
+    end: Any = tuple(points[n - 1].tolist())
     cut = Loop(bodies=(f"rod{n - 2}", "ground"), at=(spans[n - 2], end), axes=(last, last))
     point = OperationalPoint(body="rod1", at=spans[1])
     return Linkage(body=tuple(bodies), joint=tuple(joints), loop=(cut,), operational_point=point)
