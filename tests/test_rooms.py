@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7468,
+    "components": 7479,
     "fmus": 2992,
     "orchestrator": 16422,
     "programs": 1027,

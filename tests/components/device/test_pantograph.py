@@ -41,7 +41,7 @@ stop = function([POSE, V], MODEL.stop_force(POSE, V, P))
 estimate = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P))
 estimate_4 = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P, iterations=4))
 torques = function([WRENCH, POSE], MODEL.motor_torques(WRENCH, POSE, P))
-friction = function([ANGLES], MODEL.friction_torques(ANGLES, ROUGH))
+friction = function([ANGLES], MODEL.friction_torques(ANGLES, ca.SX(FRICTION_RATE), ROUGH))
 
 
 def reach(pose):
