@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7479,
     "fmus": 2992,
-    "orchestrator": 16422,
+    "orchestrator": 16429,
     "programs": 1027,
     "analysis": 8911,
     "visualization": 3738,
