@@ -101,14 +101,15 @@ def _parameters(model: DeviceModel, *, torque_limit: bool = True) -> list[Variab
 
 
 def _plant(block: Block, model: DeviceModel) -> ca.Function:
-    """(x = [place, v], u = [tau, F_hand], p, t) -> x' of (4.5)."""
-    n, k, m = len(model.start_place), model.directions.size, len(model.motors)
-    state, drive = ca.SX.sym("x", n + k), ca.SX.sym("u", m + model.device.space.size)
-    z, v, tau, F_hand = state[:n], state[n:], drive[:m], model.directions.pick(drive[m:])
+    """(x = [place, v], u = [tau, F_hand, omega_f], p, t) -> x' of (4.5)."""
+    n, k = len(model.start_place), model.directions.size
+    m, w = len(model.motors), model.device.space.size
+    state, drive = ca.SX.sym("x", n + k), ca.SX.sym("u", 2 * m + w)
+    z, v, tau, F_hand = state[:n], state[n:], drive[:m], model.directions.pick(drive[m : m + w])
     inertia, c = model.motion(z, v, block.p)
     J = model.jacobian(z, block.p)
     if "motor_friction" in block.p:
-        tau = tau + model.friction_torques(J @ v, block.p)
+        tau = tau + model.friction_torques(J @ v, drive[m + w :], block.p)
     force = J.T @ tau + F_hand
     force += model.stop_force(z, v, block.p) - c
     derivative = ca.vertcat(model.rate(z, v, block.p), ca.solve(inertia, force))
@@ -120,7 +121,11 @@ def advance_device(
 ) -> tuple[ca.SX, ca.SX]:
     """Place and velocity after h, with the torques tau and the hand's wrench held."""
     substeps, n = model.device.substeps, motion[0].numel()
-    plant, h, inputs = _plant(block, model), block.h / substeps, ca.vertcat(tau, block.u["F_hand"])
+    plant, h, scales = _plant(block, model), block.h / substeps, ca.SX(len(model.motors), 1)
+    if "motor_friction" in block.p:
+        inertia, _ = model.motion(motion[0], ca.SX(*motion[1].shape), block.p)
+        scales = model.friction_scales(model.jacobian(motion[0], block.p), inertia, h, block.p)
+    inputs = ca.vertcat(tau, block.u["F_hand"], scales)
     still, both = ca.SX(model.directions.size, 1), ca.vertcat(*motion)
     for i in range(substeps):
         t = block.t + i * block.h / substeps

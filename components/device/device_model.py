@@ -30,7 +30,7 @@ from hapticlink.components.specs.linkage import coordinates
 
 Parameters = Mapping[str, ca.SX]
 FRICTION_RATE = 0.1
-"""Rate (rad/s) over which dry friction changes its sign: at 512 Hz it takes many steps to do so."""
+"""Least rate (rad/s) over which dry friction changes its sign."""
 ASSEMBLED, STEPS = 1e-10, 50
 """Gap (m) at which a device is assembled, and steps of Newton's method that may lead there."""
 FROM_START, REACHED = 10, 1e-6
@@ -139,10 +139,17 @@ class DeviceModel(ABC):
     def _by_ratio(self, p: Parameters, of_joints: ca.SX) -> ca.SX:
         return ca.diag(p["ratio"]) @ of_joints if "ratio" in p else of_joints
 
-    def friction_torques(self, rates: ca.SX, p: Parameters) -> ca.SX:
-        """-b q' - f tanh(q'/v_f), (m,), of the rates of the motors' axes, with viscous damping b
-        and dry friction f."""
-        return -p["motor_damping"] * rates - p["motor_friction"] * ca.tanh(rates / FRICTION_RATE)
+    def friction_torques(self, rates: ca.SX, scales: ca.SX, p: Parameters) -> ca.SX:
+        """-b omega - f tanh(omega/omega_f) at rates omega (rad/s) of the motors' axes, (m,), with
+        viscous damping b, dry friction f and the `scales` omega_f."""
+        return -p["motor_damping"] * rates - p["motor_friction"] * ca.tanh(rates / scales)
+
+    def friction_scales(self, J: ca.SX, inertia: ca.SX, h: ca.SX, p: Parameters) -> ca.SX:
+        """omega_f (rad/s), (m,): FRICTION_RATE, or more where a step h would overshoot. d, the
+        diagonal of J M^-1 J', are the mobilities of the axes. That m f d h/omega_f <= 1 of each
+        bounds the trace of h M^-1 J' diag(f/omega_f) J, and so its eigenvalues, by 1."""
+        mobilities = ca.diag(J @ ca.solve(inertia, J.T))
+        return ca.fmax(FRICTION_RATE, len(self.motors) * h * p["motor_friction"] * mobilities)
 
     def stop_force(self, z: ca.SX, v: ca.SX, p: Parameters) -> ca.SX:
         """The stops along y, (k,): a unilateral spring and damper for each negative margin m, with

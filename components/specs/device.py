@@ -80,7 +80,8 @@ class Motor:
     damping: Annotated[float, Quantity("N.m.s/rad", ge=0)] | None = None
     """Viscous damping about its axis; by default 0."""
     friction: Annotated[float, Quantity("N.m", ge=0)] | None = None
-    """Dry friction about its axis: friction tanh(rate/(0.1 rad/s)); by default 0."""
+    """Dry friction about its axis: friction tanh(rate/(0.1 rad/s)), over a larger rate where a step
+    would overshoot; by default 0."""
 
 
 @dataclass(frozen=True, kw_only=True)

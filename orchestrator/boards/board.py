@@ -170,9 +170,8 @@ class Board(Instance):
         wiring = Wiring.of(self._table, len(self._torques), resolution, starts.tolist())
         self._turns = np.array([math.tau / counts for counts in wiring.counts])
         driver = self._open_port(wiring)
-        self._stack.callback(driver.close)
         try:
-            driver.open()
+            self._open(driver)
             if words := driver.zero_torque_when_killed():
                 self._stack.enter_context(write_if_killed(*words))
         except (Silent, OSError) as error:
@@ -190,6 +189,17 @@ class Board(Instance):
                 f"encoder {i + 1} is {far[i]:.2g} rad from where the scene starts: move the handle "
                 "there, or start the scene at the handle (linkage.start)"
             )
+
+    def _open(self, driver: DeviceDriver) -> None:
+        """Open the port until the end of the run; what a driver raises is not hidden by what its
+        `close` raises of a port that is half open."""
+        try:
+            driver.open()
+        except Exception:
+            with suppress(Exception):
+                driver.close()
+            raise
+        self._stack.callback(driver.close)
 
     def _resolution(self) -> list[float]:
         """The angle (rad) of a count of each encoder of the device."""

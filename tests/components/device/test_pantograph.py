@@ -49,7 +49,9 @@ estimate_4 = function(
     [ANGLES, POSE], lambda: [MODEL.place_from_angles(ANGLES, POSE, P, iterations=4)]
 )
 torques = function([WRENCH, POSE], lambda: [MODEL.motor_torques(WRENCH, POSE, P)])
-friction = function([ANGLES], lambda: [MODEL.friction_torques(ANGLES, ROUGH)])
+friction = function(
+    [ANGLES], lambda: [MODEL.friction_torques(ANGLES, ca.SX(FRICTION_RATE), ROUGH)]
+)
 
 
 def reach(pose):

@@ -219,6 +219,25 @@ def test_a_handle_elsewhere_ends_the_run_before_it_begins(port, tmp_path):
     assert not any(map(any, port.torques))
 
 
+@pytest.mark.parametrize("error", [ValueError("no port in ''"), OSError("refused")])
+def test_what_a_driver_raises_when_it_opens_is_told(port, tmp_path, monkeypatch, error):
+    """A driver whose `close` needs what `open` would have made."""
+
+    class Half(kit(port)):  # type: ignore[misc]
+        def open(self) -> None:
+            raise error
+
+        def close(self) -> None:
+            self.never_made.close()
+
+    monkeypatch.setitem(DRIVERS, "open-kit", Half)
+    if isinstance(error, OSError):
+        assert "cannot be reached: refused" in str(ran(port, tmp_path).outcome.fault)
+    else:
+        with pytest.raises(ValueError, match="no port in"):
+            ran(port, tmp_path)
+
+
 def test_limits() -> None:
     safe = SafeTorques(most=0.1, rate=10.0, motors=2)
     assert safe.limit([0.5, -0.25], 2e-3) == pytest.approx([0.02, -0.01])  # the rate; one factor
