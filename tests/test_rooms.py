@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7498,
+    "components": 7506,
     "fmus": 2992,
-    "orchestrator": 16519,
+    "orchestrator": 16521,
     "programs": 1027,
-    "analysis": 9106,
+    "analysis": 9105,
     "visualization": 3856,
     "api": 645,
     "commands": 1638,
