@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16519,
     "programs": 1027,
     "analysis": 9106,
-    "visualization": 3854,
+    "visualization": 3856,
     "api": 645,
     "commands": 1638,
 }
