@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16488,
     "programs": 1027,
-    "analysis": 9100,
+    "analysis": 9098,
     "visualization": 3783,
     "api": 635,
     "commands": 1619,
