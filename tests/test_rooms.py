@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7494,
+    "components": 7498,
     "fmus": 2992,
     "orchestrator": 16488,
     "programs": 1027,
