@@ -73,8 +73,8 @@ class Ours:
             offset += v.size
         return found
 
-    def virtual_machine(self) -> Callable[[int], tuple[float, float, float]]:
-        """As a Python FMU: (steps) -> x and y (m) of the operational point, and the time (s) that
+    def virtual_machine(self) -> Callable[[int], tuple[float, ...]]:
+        """As a Python FMU: (steps) -> the place (m) of the operational point, and the time (s) that
         they took from the start on."""
         x, after = np.zeros_like(self.start), np.zeros_like(self.start)
         given = (x, self.u, self.p, np.zeros(1), np.array([self.h]))
@@ -90,19 +90,19 @@ class Ours:
 
         return self._timed(advance)
 
-    def native(self, folder: Path) -> Callable[[int], tuple[float, float, float]]:
+    def native(self, folder: Path) -> Callable[[int], tuple[float, ...]]:
         """As a native FMU."""
         return self._timed(self.advance(folder))
 
-    def _timed(
-        self, advance: Callable[..., np.ndarray]
-    ) -> Callable[[int], tuple[float, float, float]]:
-        def run(steps: int) -> tuple[float, float, float]:
+    def _timed(self, advance: Callable[..., np.ndarray]) -> Callable[[int], tuple[float, ...]]:
+        d = self.linkage.dimension
+
+        def run(steps: int) -> tuple[float, ...]:
             x, began = self.start.copy(), time.perf_counter()
             x = advance(x, steps)
             seconds = time.perf_counter() - began
-            tip = self.outputs(x)["x"][:2] if np.isfinite(x).all() else (np.nan, np.nan)
-            return float(tip[0]), float(tip[1]), seconds
+            tip = self.outputs(x)["x"][:d] if np.isfinite(x).all() else np.full(d, np.nan)
+            return *tip.tolist(), seconds
 
         return run
 

@@ -1,10 +1,12 @@
-"""Linkages in space that tests use: overconstrained loops with known motions, and a top."""
+"""Linkages in space that tests use, beside those of the benchmarks: loops with known motions, and a
+top."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.mechanisms import bennett, body, bricard, plate
 from hapticlink.components.specs.linkage import (
     Body,
     Joint,
@@ -14,46 +16,48 @@ from hapticlink.components.specs.linkage import (
     Spring,
 )
 
+__all__ = [
+    "BALL_AND_SLIDER",
+    "DELTA",
+    "bennett",
+    "bricard",
+    "delta",
+    "governor",
+    "rssr",
+    "sarrus",
+    "slider_crank",
+    "top",
+]
+
+BALL_AND_SLIDER = """
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.3] }
+gravity = [0.0, 0.0, 9.81]
+
+[[linkage.body]]
+name = "bar"
+mass = 1.0
+inertia = [0.02, 0.02, 0.001]
+center = [0.0, 0.0, 0.2]
+
+[[linkage.body]]
+name = "block"
+mass = 2.0
+inertia = 0.01
+
+[[linkage.joint]]
+name = "ball"
+type = "spherical"
+child = "bar"
+
+[[linkage.joint]]
+name = "slide"
+type = "prismatic"
+child = "block"
+axis = [1.0, 2.0, 2.0]
+"""
+"""The [linkage] of a scene: a bar on a ball, and a block that slides beside it."""
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-
-
-def bricard():
-    """IFToMM benchmark A04: five square rods of 1 m, .1 m thick, on edges of a cube; P3 is the end
-    of the second."""
-    edges = [(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)]
-    axes = [Y, Z, X, Y, Z]
-    bodies, joints = [], []
-    for i, (edge, axis) in enumerate(zip(edges, axes, strict=True)):
-        moments = [0.01 / 6 if along else 1.01 / 12 for along in edge]
-        center = tuple(e / 2 for e in edge)
-        bodies.append(Body(name=f"rod{i}", mass=1.0, inertia=tuple(moments), center=center))
-        before = {"parent": f"rod{i - 1}", "at_parent": edges[i - 1]} if i else {}
-        joints.append(Joint(name=f"joint{i}", child=f"rod{i}", axis=axis, **before))
-    return Linkage(
-        body=tuple(bodies),
-        joint=tuple(joints),
-        loop=(Loop(bodies=("rod4", "ground"), at=(edges[4], Z), axes=(X, X)),),
-        operational_point=OperationalPoint(body="rod1", at=edges[1]),
-        gravity=(0.0, -9.81, 0.0),
-    )
-
-
-def bennett():
-    """Four revolute joints with opposite links equal: a, alpha and b, beta with
-    a sin(beta) = b sin(alpha). It is closed at q, by the joints of the tree."""
-    a, alpha, beta = 0.3, 0.9, 0.5
-    b = a * math.sin(beta) / math.sin(alpha)
-    return closed(
-        dh_loop([(a, alpha), (b, beta), (a, alpha), (b, beta)], bennett_angles(alpha, beta))
-    )
-
-
-def bennett_angles(alpha, beta, theta=1.1):
-    """Bennett's condition tan(theta_1/2) tan(theta_2/2) = sin((beta + alpha)/2)/sin((beta -
-    alpha)/2), opposite angles adding to a full turn."""
-    k = math.sin((beta + alpha) / 2) / math.sin((beta - alpha) / 2)
-    other = 2 * math.atan(k / math.tan(theta / 2))
-    return [theta, other, 2 * math.pi - theta, 2 * math.pi - other]
 
 
 def sarrus():
@@ -84,20 +88,6 @@ def sarrus():
         loop=(loop,),
         operational_point=OperationalPoint(body="table"),
     )
-
-
-def plate(name, end, mass=0.3):
-    """A thin rod from the origin of its frame to `end`, a hundredth as thick."""
-    r = np.array(end)
-    tensor = mass / 12 * (r @ r * 1.0001 * np.eye(3) - np.outer(r, r))
-    return body(name, mass, tensor, r / 2)
-
-
-def body(name, mass, tensor, center):
-    """A body with an inertia tensor about its centre of mass."""
-    entries = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
-    inertia, at = (tuple(float(v) for v in of) for of in (entries, center))
-    return Body(name=name, mass=mass, inertia=inertia, center=at)
 
 
 def rssr(closure="spherical"):
@@ -190,40 +180,6 @@ def governor():
         operational_point=OperationalPoint(body="slider"),
         start_velocity={"shaft": 2 * math.pi},
     )
-
-
-def dh_loop(links, angles):
-    """Points and axes of a closed chain of revolute joints by Denavit and Hartenberg's lengths and
-    twists (a, alpha), at joint angles."""
-    frame, points, axes = np.eye(4), [], []
-    for (a, alpha), theta in zip(links, angles, strict=True):
-        points.append(frame[:3, 3])
-        axes.append(frame[:3, 2])
-        c, s = math.cos(theta), math.sin(theta)
-        turn = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-        c, s = math.cos(alpha), math.sin(alpha)
-        along = np.array([[1, 0, 0, a], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1.0]])
-        frame = frame @ turn @ along
-    np.testing.assert_allclose(frame, np.eye(4), atol=1e-12)
-    return points, axes
-
-
-def closed(loop):
-    """The linkage of a closed chain, its last joint cut, with rods between the joints."""
-    points, axes = loop
-    n = len(points)
-    bodies, joints = [], []
-    spans = [tuple(float(v) for v in points[(i + 1) % n] - points[i]) for i in range(n)]
-    for i in range(n - 1):
-        bodies.append(plate(f"rod{i}", spans[i]))
-        before = {"parent": f"rod{i - 1}", "at_parent": spans[i - 1]} if i else {}
-        axis = tuple(axes[i].tolist())
-        joints.append(Joint(name=f"joint{i}", child=f"rod{i}", axis=axis, **before))
-    last = tuple(axes[n - 1].tolist())
-    end = tuple(points[n - 1].tolist())
-    cut = Loop(bodies=(f"rod{n - 2}", "ground"), at=(spans[n - 2], end), axes=(last, last))
-    point = OperationalPoint(body="rod1", at=spans[1])
-    return Linkage(body=tuple(bodies), joint=tuple(joints), loop=(cut,), operational_point=point)
 
 
 def top(**changes):

@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7498,
+    "components": 7502,
     "fmus": 2992,
-    "orchestrator": 16488,
+    "orchestrator": 16519,
     "programs": 1027,
-    "analysis": 9098,
-    "visualization": 3783,
-    "api": 635,
-    "commands": 1619,
+    "analysis": 9104,
+    "visualization": 3856,
+    "api": 645,
+    "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

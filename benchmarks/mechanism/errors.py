@@ -1,4 +1,5 @@
-"""Run time against error on three mechanisms: our integrators and four multibody codes.
+"""Run time against error on mechanisms in the plane and in space: our integrators and four
+multibody codes.
 
 Every code starts from the same assembled pose and rates, and takes steps of equal length; only
 stepping is timed. Runs are interleaved round by round and the least of the rounds counts. The
@@ -11,7 +12,7 @@ from __future__ import annotations
 import importlib
 import json
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -21,6 +22,7 @@ from scipy.integrate import solve_ivp
 
 from benchmarks import mechanisms
 from benchmarks.maximal import Bodies
+from benchmarks.mechanisms import bennett, bricard, falling
 from benchmarks.our_mechanism import Ours
 from benchmarks.page import Progress
 from benchmarks.rows import Rows
@@ -35,12 +37,14 @@ EVALUATIONS = {
     "linearly-implicit": 2,
     "semi-implicit-euler": 1,
 }
-COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y")
+COLUMNS = ("case", "code", "method", "rate", "round", "seconds", "x", "y", "z")
+NO_WRENCH = (0.0, 0.0, 0.0)
 LOST = 0.1  # m; with a larger error the run has diverged
 SLOW = 3.0  # s; a run this long is not repeated
 MANY = 40  # bodies with which a step of a loop in Python takes 7 ms and more, and is left out
 NATIVE, MACHINE = "ours, C", "ours, CasADi VM"
-Run = Callable[[int], tuple[float, float, float]]
+Run = Callable[[int], tuple[float, ...]]
+"""(steps) -> the tip's place (m), x, y and in space z, and the time (s) that they took."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +55,7 @@ class Case:
     rates: tuple[int, ...]
     exact: Callable[[], tuple[np.ndarray, float]]
     settings: tuple[tuple[str, str], ...]
-    wrench: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    wrench: tuple[float, float, float] = NO_WRENCH
 
 
 PROJECTED = ("passive-midpoint",)
@@ -60,6 +64,7 @@ ALL = (
     *((i, s) for i in METHODS if i not in PROJECTED for s in ("none", "baumgarte", "projection")),
     *((i, "projection") for i in PROJECTED),
 )
+SPATIAL = tuple((i, "projection") for i in METHODS)
 FEW = (("semi-implicit-euler", "baumgarte"), ("heun", "projection"), ("rk4", "projection"))
 
 
@@ -84,6 +89,13 @@ def cases(quick: bool) -> list[Case]:
     ):
         name, linkage = f"N-four-bar, N = {N}, 10 s", mechanisms.n_four_bar(N)
         found.append(Case(name, linkage, 10.0, rates, closed_form(N), settings))
+    start = Ours(bricard(), NO_WRENCH, Mechanism(), 1 / 512)
+    for name, linkage, end, exact in (
+        ("Bricard", start.linkage, 4.0, partial(tip_in_space, start, 4.0)),
+        ("Bennett", falling(bennett()), 2.0, partial(tip_of_bennett, 2.0)),
+    ):
+        rates = (250, 1000) if quick else (125, 250, 500, 1000, 2000, 4000)
+        found.append(Case(f"{name}, in space, {end:.0f} s", linkage, end, rates, exact, SPATIAL))
     return found
 
 
@@ -137,8 +149,8 @@ def measure(out: Path, quick: bool, progress: Progress) -> tuple[dict[str, list[
                 if (*key, number) in rows or (first and float(first["seconds"]) > SLOW):
                     continue
                 run = prepared.get(key) or prepared.setdefault(key, prepare())
-                x, y, seconds = run(round(case.end * rate))
-                rows.add(*key, number, float(seconds), float(x), float(y))
+                *place, seconds = run(round(case.end * rate))
+                rows.add(*key, number, float(seconds), *map(float, _in_space(place)))
         exact, floor = _exact(case, out)
         found[case.name] = _aggregate(rows, case, exact, floor)
     return found, missing
@@ -156,6 +168,11 @@ def _exact(case: Case, out: Path) -> tuple[np.ndarray, float]:
     return np.array(known), floor
 
 
+def _in_space(place: Sequence[float] | np.ndarray) -> tuple[float, ...]:
+    """A place with its z, which is 0 in the plane."""
+    return (*place, 0.0)[:3]
+
+
 def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[dict]:
     groups: dict[tuple[str, str, int], list[dict[str, str]]] = {}
     for row in rows.rows.values():
@@ -163,8 +180,7 @@ def _aggregate(rows: Rows, case: Case, exact: np.ndarray, floor: float) -> list[
             groups.setdefault((row["code"], row["method"], int(row["rate"])), []).append(row)
     found = []
     for (code, method, rate), runs in groups.items():
-        x, y = float(runs[0]["x"]), float(runs[0]["y"])
-        error = math.hypot(x - exact[0], y - exact[1])
+        error = math.dist([float(runs[0][axis]) for axis in "xyz"], _in_space(exact))
         least = min(float(r["seconds"]) for r in runs)
         found.append(
             {
@@ -209,6 +225,29 @@ def advantage(rows: list[dict], peer: str) -> list[tuple[float, float, float]]:
     return found
 
 
+def tip_of_bennett(end: float) -> tuple[np.ndarray, float]:
+    """(x, y, z) of the point of `falling(bennett())` at `end` (s), and by how much it differs with
+    a tenth of the accuracy: the loop has one motion, q(theta) in closed form (mechanisms.py), whose
+    acceleration q' (D (q' theta'' + q'' theta'^2) + C q' theta' + g) = 0 has Pinocchio's terms."""
+    from benchmarks.peers.pinocchio_peer import Terms
+
+    terms = Terms(falling(bennett()))
+
+    def f(_: float, x: np.ndarray) -> np.ndarray:
+        q, slope, bend = mechanisms.bennett_motion(x[0])
+        at = terms.at(q, slope * x[1])
+        pulls = at["nle"] + at["D"] @ bend * x[1] ** 2
+        return np.array([x[1], -(slope @ pulls) / (slope @ at["D"] @ slope)])
+
+    start = mechanisms.BENNETT_START, 0.0
+    found = []
+    for accuracy in (1, 10):
+        tolerance = TOLERANCE | {"rtol": 1e-13 * accuracy}
+        theta = solve_ivp(f, (0, end), start, **tolerance).y[0, -1]
+        found.append(terms.at(mechanisms.bennett_motion(theta)[0], np.zeros(3))["x_h"])
+    return found[0], float(np.linalg.norm(found[0] - found[1]))
+
+
 TOLERANCE = {"method": "DOP853", "rtol": 1e-13, "atol": 1e-14}
 
 
@@ -227,7 +266,26 @@ def _relative(ours: Ours, end: float) -> np.ndarray:
         return np.r_[x[n:], ours.outputs(x)["qdd"]]
 
     last = solve_ivp(f, (0, end), ours.start, **TOLERANCE).y[:, -1]
-    return ours.outputs(last)["x"][:2]
+    return ours.outputs(last)["x"][: ours.linkage.dimension]
+
+
+def tip_in_space(ours: Ours, end: float) -> tuple[np.ndarray, float]:
+    """As `tip`, of (x, y, z); the other formulation is Pinocchio's terms, with multipliers by least
+    squares."""
+    from benchmarks.peers.pinocchio_peer import REPEATED, Terms
+
+    terms, n = Terms(ours.linkage), len(ours.start) // 2
+
+    def f(_: float, x: np.ndarray) -> np.ndarray:
+        at = terms.at(x[:n], x[n:])
+        free = np.linalg.solve(at["D"], np.column_stack([-at["nle"], at["W"].T]))
+        pulled, Y = free[:, 0], free[:, 1:]
+        multipliers = np.linalg.lstsq(at["W"] @ Y, -at["w"] - at["W"] @ pulled, rcond=REPEATED)[0]
+        return np.r_[x[n:], pulled + Y @ multipliers]
+
+    last = solve_ivp(f, (0, end), ours.start, **TOLERANCE).y[:, -1]
+    second = terms.at(last[:n], last[n:])["x_h"]
+    return second, float(np.linalg.norm(_relative(ours, end) - second))
 
 
 def _maximal(ours: Ours, end: float) -> np.ndarray:

@@ -32,9 +32,12 @@ NOTES = f"""- `ours, C` is what a native FMU runs (`packaging = "native"`): the 
   in C++ would take for the same RK4 step; the ratio above counts it, at the error of our RK4 with
   projection.
 - The error is that of one tip at one time: where it crosses zero, its row shows too small a one.
-- MuJoCo's equalities are soft, with one stiffness (time constant 2 h): its error is theirs, and no
-  smaller with a method of higher order. Drake takes loops in its discrete plant alone, whose step
-  is of first order.
+- MuJoCo's equalities are soft, with one stiffness (time constant 2 h): in the plane its error is
+  theirs, and no smaller with a method of higher order. Drake takes loops in its discrete plant
+  alone, whose step is of first order.
+- In space loops are closed by two points on the axis of the cut joint, and by Exudyn's revolute
+  joints. Redundant closures differ off the closed poses: Pinocchio's are held softly
+  (mu = 1e-2), since smaller numbers brake Bennett's loop.
 - Pinocchio with generated code, by CasADi or CppADCodeGen, is in none of its wheels on PyPI. A step
   in minimal coordinates, and where their charts end: [formulations](../formulations/README.md).
 - Runs longer than {SLOW:g} s were not repeated. With an error above {LOST:g} m, or none, a run has

@@ -18,16 +18,11 @@ from pydrake.multibody import tree
 from pydrake.multibody.math import SpatialForce
 from pydrake.systems.analysis import Simulator
 
-from benchmarks.peers.comparable import require_comparable
+from benchmarks.peers.comparable import axis, pinned, require_comparable, vector
 from hapticlink.components.specs.linkage import Joint, Linkage
-from hapticlink.components.specs.quantities import Place, in_plane
 
 NAME = "Drake"
 METHODS = ("discrete, SAP",)
-
-
-def _place(point: Place | None) -> np.ndarray:
-    return np.array([*in_plane(point), 0.0])
 
 
 def _plant(linkage: Linkage, h: float) -> Any:
@@ -35,10 +30,11 @@ def _plant(linkage: Linkage, h: float) -> Any:
     require_comparable(linkage)
     plant = plants.MultibodyPlant(h)
     plant.set_discrete_contact_approximation(plants.DiscreteContactApproximation.kSap)
-    plant.mutable_gravity_field().set_gravity_vector(_place(linkage.gravity))
+    plant.mutable_gravity_field().set_gravity_vector(vector(linkage.gravity))
     for body in linkage.body:
-        inertia = tree.RotationalInertia(body.inertia, body.inertia, body.inertia)
-        about = tree.SpatialInertia.MakeFromCentralInertia(body.mass, _place(body.center), inertia)
+        I = body.inertia_tensor  # noqa: E741
+        inertia = tree.RotationalInertia(*np.diag(I), I[0, 1], I[0, 2], I[1, 2])
+        about = tree.SpatialInertia.MakeFromCentralInertia(body.mass, vector(body.center), inertia)
         plant.AddRigidBody(body.name, about)
     for joint in linkage.joint:
         ends = _body(plant, joint.parent), _body(plant, joint.child)
@@ -47,11 +43,15 @@ def _plant(linkage: Linkage, h: float) -> Any:
             for k, (body, at) in enumerate(zip(ends, _ends(joint), strict=True))
         )
         plant.AddJoint(_joint(joint, *frames))
-    for loop in linkage.loop:
-        (a, at_a), (b, at_b) = (
-            (_body(plant, body), _place(at)) for body, at in zip(loop.bodies, loop.at, strict=True)
-        )
-        plant.AddBallConstraint(a, at_a, b, at_b)
+    # A ball constraint of the world's own body ends the process: one welded to it takes its place.
+    about = tree.SpatialInertia.MakeFromCentralInertia(
+        1, np.zeros(3), tree.RotationalInertia(1, 1, 1)
+    )
+    base = plant.AddRigidBody("base", about)
+    plant.WeldFrames(plant.world_frame(), base.body_frame())
+    for ends in pinned(linkage):
+        found = ((base if of == "ground" else _body(plant, of), at) for of, at in ends)
+        plant.AddBallConstraint(*(each for end in found for each in end))
     plant.Finalize()
     return plant
 
@@ -61,7 +61,7 @@ def _body(plant: Any, name: str) -> Any:
 
 
 def _ends(joint: Joint) -> list[RigidTransform]:
-    return [RigidTransform(_place(at)) for at in (joint.at_parent, joint.at_child)]
+    return [RigidTransform(vector(at)) for at in (joint.at_parent, joint.at_child)]
 
 
 def _joint(joint: Joint, parent: Any, child: Any) -> Any:
@@ -69,16 +69,16 @@ def _joint(joint: Joint, parent: Any, child: Any) -> Any:
         return tree.PlanarJoint(joint.name, parent, child)
     (freedom,) = joint.kind.freedoms
     if freedom.turns:
-        return tree.RevoluteJoint(joint.name, parent, child, [0, 0, 1])
+        return tree.RevoluteJoint(joint.name, parent, child, axis(joint))
     return tree.PrismaticJoint(joint.name, parent, child, [*joint.direction(freedom), 0])
 
 
 def prepare(
     linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray, method: str, h: float
-) -> Callable[[int], tuple[float, float, float]]:
+) -> Callable[[int], tuple[float, ...]]:
     plant = _plant(linkage, h)
     op = linkage.held
-    body, at = _body(plant, op.body), _place(op.at)
+    body, at = _body(plant, op.body), vector(op.at)
     joints = [plant.GetJointByName(joint.name) for joint in linkage.joint]
     order = [
         i for j in joints for i in range(j.position_start(), j.position_start() + j.num_positions())
@@ -89,7 +89,7 @@ def prepare(
     pushed.body_index, pushed.p_BoBq_B = body.index(), at
     pushed.F_Bq_W = SpatialForce(tau=[0, 0, wrench[2]], f=[*wrench[:2], 0])
 
-    def run(steps: int) -> tuple[float, float, float]:
+    def run(steps: int) -> tuple[float, ...]:
         simulator = Simulator(plant)
         context = simulator.get_mutable_context()
         plant.SetPositionsAndVelocities(context, start)
@@ -99,9 +99,7 @@ def prepare(
         began = time.perf_counter()
         simulator.AdvanceTo(steps * h)
         seconds = time.perf_counter() - began
-        x, y, _ = plant.CalcPointsPositions(
-            context, body.body_frame(), at, plant.world_frame()
-        ).ravel()
-        return float(x), float(y), seconds
+        place = plant.CalcPointsPositions(context, body.body_frame(), at, plant.world_frame())
+        return *place.ravel()[: linkage.dimension].tolist(), seconds
 
     return run

@@ -1,4 +1,5 @@
-"""Exudyn: bodies in absolute coordinates, joints and loops as RevoluteJoint2D constraints.
+"""Exudyn: bodies in absolute coordinates, joints and loops as RevoluteJoint2D constraints, in space
+as revolute joints of bodies with Euler parameters.
 
 Its implicit second-order integrators solve index 2 (trapezoidal) and index 3 (generalised alpha)
 with Newton iterations inside its C++ solver; its explicit integrators take no joints. Built as its
@@ -15,6 +16,8 @@ from collections.abc import Callable
 import numpy as np
 
 from benchmarks.maximal import Bodies
+from benchmarks.peers.comparable import axis, require_comparable, vector
+from hapticlink.components.linkage.poses import poses
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.components.specs.quantities import Place, in_plane
 
@@ -22,6 +25,7 @@ from hapticlink.components.specs.quantities import Place, in_plane
 sys.exudynFast = True  # type: ignore[attr-defined]
 import exudyn as exu  # noqa: E402
 import exudyn.itemInterface as item  # noqa: E402
+from exudyn.utilities import RigidBodyInertia  # noqa: E402
 
 NAME = "Exudyn"
 METHODS = ("trapezoidal, index 2", "generalised alpha (0.9), index 3")
@@ -30,12 +34,12 @@ SPARSE_FROM = 30  # bodies
 
 def prepare(
     linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray, method: str, h: float
-) -> Callable[[int], tuple[float, float, float]]:
-    z, zd = Bodies(linkage).start(q, qd)
+) -> Callable[[int], tuple[float, ...]]:
     settings = _settings(method, h, len(linkage.body))
+    build = _build_in_space if linkage.dimension > 2 else _build
 
-    def run(steps: int) -> tuple[float, float, float]:
-        system, mbs, sensor = _build(linkage, wrench, z.reshape(-1, 3), zd.reshape(-1, 3))
+    def run(steps: int) -> tuple[float, ...]:
+        system, mbs, sensor = build(linkage, wrench, q, qd)
         settings.timeIntegration.numberOfSteps = steps
         settings.timeIntegration.endTime = steps * h
         solver = exu.MainSolverImplicitSecondOrder()
@@ -43,17 +47,65 @@ def prepare(
         began = time.perf_counter()
         done = solver.SolveSteps(mbs, settings)
         seconds = time.perf_counter() - began
-        x, y = mbs.GetSensorValues(sensor)[:2] if done else (math.nan, math.nan)
+        place = mbs.GetSensorValues(sensor) if done else np.full(3, math.nan)
         solver.FinalizeSolver(mbs, settings)
         system.Reset()
-        return x, y, seconds
+        return *place[: linkage.dimension].tolist(), seconds
 
     return run
 
 
-def _build(linkage: Linkage, wrench: np.ndarray, z: np.ndarray, zd: np.ndarray) -> tuple:
-    """(system container, assembled system, sensor at the operational point); z and zd: poses and
-    velocities of the centres of mass, (k, 3)."""
+def _build_in_space(linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray) -> tuple:
+    """As `_build`, of a linkage of revolute joints that starts at rest."""
+    require_comparable(linkage)
+    if np.any(qd) or np.any(wrench):
+        raise ValueError("in space a linkage falls from rest")
+    container = exu.SystemContainer()
+    mbs = container.AddSystem()
+    numbers = {"ground": mbs.CreateGround()}
+    at_start = {name: pose[0] for name, pose in poses(linkage, [q.tolist()]).items()}
+
+    def place(body: str, at: Place | None) -> np.ndarray:
+        pose = at_start[body]
+        return pose[:3] + pose[3:].reshape(3, 3).T @ vector(at)
+
+    for b in linkage.body:
+        turned = at_start[b.name][3:].reshape(3, 3).T
+        inertia = RigidBodyInertia(mass=b.mass, inertiaTensor=b.inertia_tensor)
+        numbers[b.name] = mbs.CreateRigidBody(
+            referencePosition=place(b.name, b.center),
+            referenceRotationMatrix=turned,
+            inertia=inertia,
+            gravity=vector(linkage.gravity),
+        )
+    pins = [(j.parent, j.child, place(j.parent, j.at_parent), axis(j)) for j in linkage.joint]
+    for loop in linkage.loop:
+        own = loop.axes[0] if loop.axes else (0.0, 0.0, 1.0)
+        pins.append((*loop.bodies, place(loop.bodies[0], loop.at[0]), np.array(own)))
+    for first, second, at, along in pins:
+        mbs.CreateRevoluteJoint(
+            bodyNumbers=[numbers[first], numbers[second]],
+            position=at,
+            axis=at_start[first][3:].reshape(3, 3).T @ along,
+            useGlobalFrame=True,
+        )
+    op = linkage.held
+    center = next(b.center for b in linkage.body if b.name == op.body)
+    sensor = mbs.AddSensor(
+        item.SensorBody(
+            bodyNumber=numbers[op.body],
+            localPosition=vector(op.at) - vector(center),
+            outputVariableType=exu.OutputVariableType.Position,
+            writeToFile=False,
+        )
+    )
+    mbs.Assemble()
+    return container, mbs, sensor
+
+
+def _build(linkage: Linkage, wrench: np.ndarray, q: np.ndarray, qd: np.ndarray) -> tuple:
+    """(system container, assembled system, sensor at the operational point)."""
+    z, zd = (each.reshape(-1, 3) for each in Bodies(linkage).start(q, qd))
     container = exu.SystemContainer()
     mbs = container.AddSystem()
     centers = {b.name: np.array(b.center or (0.0, 0.0)) for b in linkage.body} | {

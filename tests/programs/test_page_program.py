@@ -19,6 +19,7 @@ import fmpy
 import numpy as np
 import pytest
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.real_time_session import LiveRun
 from hapticlink.orchestrator.results.run_results import RunResults
@@ -32,7 +33,7 @@ from hapticlink.programs.page_program import write_page_sources
 from hapticlink.programs.ports import ports
 from hapticlink.programs.resolve_scene import resolve_scene
 from hapticlink.visualization.browser_code import one_file
-from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, load_viewed_scene
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene, mouse
 from hapticlink.visualization.standalone import page
 from hapticlink.visualization.standalone.description import PageDescription
 from tests.visualization.browser_code.javascript import javascript
@@ -122,7 +123,7 @@ def apply(live: LiveRun, message: dict[str, Any]) -> None:
             live.set("hand.stiffness", (0.0, 0.0, 0.0))
         case {"type": "hand", "at": at}:
             live.set("hand.target", (*at, 0.0))
-            live.set("hand.stiffness", STIFFNESS)
+            live.set("hand.stiffness", mouse(live.scene.space)[0])
         case {"key": "graphics.rate", "value": rate}:
             own = live.scene.graphics and live.scene.graphics.rate
             live.rate("graphics", None if rate == own else rate)
@@ -180,7 +181,7 @@ def test_webassembly_has_the_bits_of_the_same_c_with_the_same_sine(tmp_path: Pat
         files = write_page_sources(program, made, variables, description.drawing)
     references = description.data["parameters"]
     pull = dict(zip(references["hand.target"], (0.06, -0.01, 0.0), strict=True))
-    pull |= dict(zip(references["hand.stiffness"], STIFFNESS, strict=True))
+    pull |= dict(zip(references["hand.stiffness"], mouse(PLANE)[0], strict=True))
     main = MAIN.replace("SET", " ".join(f"set(m, {r}, {v});" for r, v in pull.items()))
     (tmp_path / "main.c").write_text(main)
     for name, text in files.items():

@@ -11,6 +11,10 @@ import pinocchio as pin
 import pytest
 from scipy.integrate import solve_ivp
 
+from benchmarks.mechanism.errors import tip_of_bennett
+from benchmarks.mechanisms import bennett, bricard
+from benchmarks.our_mechanism import Ours
+from benchmarks.peers import mujoco_peer, pinocchio_peer
 from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 from hapticlink.components.dynamics.assembly import AssemblyError, start_coordinates
 from hapticlink.components.dynamics.operational_space import OperationalSpace
@@ -28,8 +32,6 @@ from tests.components.linkage.test_lifted import accelerations
 from tests.mechanisms import evaluated
 from tests.spatial_linkages import (
     DELTA,
-    bennett,
-    bricard,
     delta,
     governor,
     rssr,
@@ -388,11 +390,31 @@ FALLING = replace(bennett(), gravity=(0.0, -9.81, 0.0))
 
 
 def test_an_overconstrained_loop_is_not_locked_by_what_is_redundant():
-    """Bennett's loop falls as its energy says, at poses between the closed ones, too."""
+    """Bennett's loop falls as its energy says, at poses between the closed ones, too, and as its
+    one motion in closed form."""
     found, states = run(FALLING, 500, 1e-3)
+    exact, floor = tip_of_bennett(0.5)
+    assert floor < 1e-12
+    tip = [found[f"x[{i}]"][-1] for i in (1, 2, 3)]
+    np.testing.assert_allclose(tip, exact, rtol=0, atol=1e-9)
     assert np.ptp(states[:, 0]) > 3.0
     assert np.ptp(found["energy"]) < 1e-8
     assert found["closure_error"].max() < 1e-14
+
+
+@pytest.mark.parametrize(
+    ("peer", "method", "error"),
+    [(mujoco_peer, "RK4", 1e-6), (pinocchio_peer, pinocchio_peer.METHODS[0], 1e-9)],
+    ids=["mujoco", "pinocchio"],
+)
+def test_peers_of_the_benchmark_are_given_the_same_linkage(peer, method, error):
+    """Bricard's, within the error of their closures."""
+    ours = Ours(bricard(), (0.0, 0.0, 0.0), Mechanism(), 1e-3)
+    q, qd = np.split(ours.start, 2)
+    *wanted, _ = ours.virtual_machine()(200)
+    *tip, _ = peer.prepare(ours.linkage, np.zeros(3), q, qd, method, 1e-3)(200)
+    assert np.linalg.norm(np.subtract(tip, wanted)) < error
+    assert np.linalg.norm(np.subtract(tip, (1.0, -1.0, 0.0))) > 0.05
 
 
 @pytest.mark.parametrize("linkage", [bricard(), FALLING], ids=["bricard", "bennett"])

@@ -114,7 +114,7 @@ export class Stage {
   // Turns a picture in space about the middle of its bodies.
   turn(about, down) {
     if (!this.view.inSpace || !this.limits) return;
-    const ends = this.marks.filter(({ role }) => role === "body").flatMap(({ at }) => at.map((each) => place(this.frame, each)));
+    const ends = this.marks.filter(({ role }) => role === "body").flatMap(({ at }) => at.map((each) => place(this.frame, each))).filter(Boolean);
     const middle = [0, 1, 2].map((i) => ends.reduce((sum, end) => sum + end[i] / ends.length, 0)), before = this.view.project(middle);
     this.view.turn(about, down);
     const by = this.view.project(middle).map((v, i) => v - before[i]);

@@ -19,6 +19,8 @@ from hapticlink.orchestrator.base.signal_names import POINT_POSE
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.mechanism.mark_places import MM, on_page
+from hapticlink.visualization.mechanism.view import view_of_run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -61,13 +63,16 @@ def figures(runs: Mapping[str, Results]) -> dict[str, Figure]:
         for name, (title, y, curves) in over_time.items()
         if any(len(time) for time, _ in curves.values())
     }
-    paths: Curves = {
-        name: (table[POINT_POSE][:, 0] * 1e3, table[POINT_POSE][:, 1] * 1e3)
-        for name, run in runs.items()
-        if (table := of_port(run, POINT_POSE))
-    }
+    views = {name: view_of_run(run) for name, run in runs.items()}
+    paths: Curves = {}
+    for name, view in views.items():
+        if table := of_port(runs[name], POINT_POSE):
+            right, up = on_page(table[POINT_POSE][:, : view.dimension] * MM, view).T
+            paths[name] = right, up
     if paths:
-        figure = _figure("Paths of the operational point", "x (mm)", "y (mm)", paths)
+        is_plane = all(view.dimension == 2 for view in views.values())
+        axes = ("x (mm)", "y (mm)") if is_plane else ("to the right, as seen (mm)", "up (mm)")
+        figure = _figure("Paths of the operational point", *axes, paths)
         figure.axes[0].set_aspect("equal", adjustable="datalim")
         made["paths"] = figure
     return made

@@ -55,7 +55,7 @@ from hapticlink.visualization.figures.force_figure import STYLES, forces
 from hapticlink.visualization.figures.real_time_figure import real_time
 from hapticlink.visualization.mechanism import drawing, marks
 from hapticlink.visualization.mechanism.mark_places import MM, on_page
-from hapticlink.visualization.mechanism.view import PLANE_VIEW, View, view_of
+from hapticlink.visualization.mechanism.view import view_of_run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -195,7 +195,7 @@ def _arrow(results: Results, axes: Axes) -> None:
     place = (marks.Place((where,), (0.0,) * len(pose)),)
     arrow = marks.arrow("force", place, color, label, ("F_hand",))._replace(size=ARROW / size)
     frame = {where: pose.tolist(), "F_hand": force.tolist()}
-    drawing.paint(axes, [arrow], frame, zorder=6, view=_view(results))
+    drawing.paint(axes, [arrow], frame, zorder=6, view=view_of_run(results))
 
 
 def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
@@ -204,7 +204,7 @@ def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     handle = handle or of_port(results, POINT_POSE)
     if not (force and handle):
         return None
-    view = _view(results)
+    view = view_of_run(results)
     F, times = force[HAND_WRENCH][:, : view.dimension], force["time"]
     most = np.hypot.reduce(F, axis=1)
     k = int(most.argmax())
@@ -218,7 +218,7 @@ def _mark(results: Results, marked: Sequence[Episode], axes: Axes) -> None:
     if of_port(results, POINT_POSE) is None:
         return
     time, path = curve(*_place(results, POINT_POSE))
-    path = on_page(path, _view(results))
+    path = on_page(path, view_of_run(results))
     for width, kind in enumerate(reversed({e.kind: None for e in marked}), 2):
         color, label = marks.KINDS[kind]
         spans = [(e.begin - 1e-12, e.end + 1e-12) for e in marked if e.kind == kind]
@@ -234,13 +234,7 @@ def _place(results: Results, signal: str) -> tuple[Vector, Vector]:
     """Times (s) and places (mm) of a pose, (k, 2), in space (k, 3)."""
     table = of_port(results, signal)
     assert table is not None
-    return table["time"], table[signal][:, : _view(results).dimension] * MM
-
-
-def _view(results: Results) -> View:
-    """How the linkage of a run is seen."""
-    linkage = scene_part(results, "linkage", Linkage)
-    return view_of(linkage) if linkage else PLANE_VIEW
+    return table["time"], table[signal][:, : view_of_run(results).dimension] * MM
 
 
 def _paths(results: Results) -> list[tuple[str, str, Vector]]:
@@ -252,7 +246,7 @@ def _paths(results: Results) -> list[tuple[str, str, Vector]]:
         for point in linkage.get("point", ())
     ]
     return [
-        (label, style, on_page(curve(*_place(results, signal))[1], _view(results)))
+        (label, style, on_page(curve(*_place(results, signal))[1], view_of_run(results)))
         for signal, label, style in (
             (POINT_POSE, "operational point x_S", "-"),
             (find_handle(results), "handle x_D", "--"),

@@ -161,6 +161,5 @@ def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64],
             gains[f"{fmu.name}.{port}"] = start, [s.unit or "" for s in entries]
     for name in (stiffness(user) for user in users(scene)):
         if name in gains:
-            assert scene.linkage
-            gains[name] = np.array(mouse(scene.linkage)[0]), gains[name][1]
+            gains[name] = np.array(mouse(scene.space)[0]), gains[name][1]
     return gains

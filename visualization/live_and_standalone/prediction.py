@@ -108,7 +108,7 @@ def judge_hands(
                 for c in whole.connections
             ),
         )
-        stiffness, damping = mouse(scene.linkage)
+        stiffness, damping = mouse(scene.space)
         pulled = SpringHand(stiffness=stiffness, damping=damping)
         hands = {MOUSE: pulled, **hands_in(scene.space)}
         without, _ = frozen_nonlinearities.without(system)

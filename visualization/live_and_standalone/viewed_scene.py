@@ -5,7 +5,7 @@ from __future__ import annotations
 import pickle
 
 from hapticlink.components import registry
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.port_space import PortSpace
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import InputFault
@@ -42,7 +42,7 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
     hand = {
         "type": "spring",
         "stiffness": [0.0, 0.0, 0.0],
-        "damping": mouse(linkage)[1],
+        "damping": mouse(linkage.space)[1],
         "target": [[0.0, 0.0, 0.0, 0.0]],
     }
     record = {"signals": "all"}  # what is not recorded is not read from its FMU
@@ -54,9 +54,9 @@ def load_viewed_scene(name: str, options: Options = (), duration: float = DURATI
     return open_scene.load(read, changes)
 
 
-def mouse(linkage: Linkage) -> tuple[Three, Three]:
+def mouse(space: PortSpace) -> tuple[Three, Three]:
     """Stiffness and damping of the mouse's spring, an entry for each direction of the handle."""
-    x, y, z = linkage.space.turns
+    x, y, z = space.turns
     return (STIFFNESS[x], STIFFNESS[y], STIFFNESS[z]), (DAMPING[x], DAMPING[y], DAMPING[z])
 
 

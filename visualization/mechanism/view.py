@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.components.specs.linkage import Linkage
+from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.orchestrator.results.recorded_scene import scene_part
 
 Matrix = NDArray[np.float64]
 Direction = tuple[float, float, float]
@@ -45,6 +47,12 @@ class View:
 
 
 PLANE_VIEW = View()
+
+
+def view_of_run(results: Results) -> View:
+    """The view of the linkage of a run; that of the plane where there is none."""
+    linkage = scene_part(results, "linkage", Linkage)
+    return view_of(linkage) if linkage else PLANE_VIEW
 
 
 def view_of(linkage: Linkage) -> View:

@@ -5,36 +5,9 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import read_and_check
+from tests.spatial_linkages import BALL_AND_SLIDER
 
-SCENE = """
-title = "A bar on a ball, and a slider"
-duration = 0.1
-
-[linkage]
-operational_point = { body = "bar", at = [0.0, 0.0, 0.3] }
-gravity = [0.0, 0.0, -9.81]
-
-[[linkage.body]]
-name = "bar"
-mass = 1.0
-inertia = [0.02, 0.02, 0.001]
-
-[[linkage.body]]
-name = "block"
-mass = 1.0
-inertia = 0.01
-
-[[linkage.joint]]
-name = "ball"
-type = "spherical"
-child = "bar"
-
-[[linkage.joint]]
-name = "slide"
-type = "prismatic"
-child = "block"
-axis = [1.0, 0.0, 0.0]
-"""
+SCENE = f'title = "A bar on a ball, and a slider"\nduration = 0.1\n{BALL_AND_SLIDER}'
 ROD = (
     "linkage.loop.+={ type = 'rod', bodies = ['bar', 'block'], "
     "at = [[0, 0, 0.1], [0.3, 0, 0]], length = 0.31622776601683794%s }"

@@ -11,9 +11,10 @@ from typing import Any
 
 import pytest
 
+from hapticlink.components.port_space import PLANE
 from hapticlink.visualization.live_and_standalone.offered_controls import JITTER, RATE, Settings
 from hapticlink.visualization.live_and_standalone.prediction import predict_stability
-from hapticlink.visualization.live_and_standalone.viewed_scene import STIFFNESS, load_viewed_scene
+from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene, mouse
 from tests.analysis.stability.own_hand import own_hand
 from tests.visualization.browser_code.chromium import Page, chromium
 from tests.visualization.browser_code.served_page import Served, values
@@ -107,7 +108,7 @@ def test_a_newer_question_ends_what_is_computed(page: Served) -> None:
         found = window.until(lambda new: new.get("map", {}).get("verdict"), QUICK)["map"]
         assert _children(server, "live_page.stability_process") == [computing]
         handle = window.until(lambda new: True)["frame"]["handle"]
-    parameters = {"hand.stiffness": [*STIFFNESS], "hand.target": handle}
+    parameters = {"hand.stiffness": [*mouse(PLANE)[0]], "hand.target": handle}
     why = predict_stability(load_viewed_scene(SCENE, OPTIONS), {}, parameters)["why"]
     assert found["why"].startswith(why.partition("\n")[0])
 
