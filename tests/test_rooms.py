@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7506,
+    "components": 7510,
     "fmus": 2992,
     "orchestrator": 16521,
     "programs": 1027,
-    "analysis": 9105,
+    "analysis": 9103,
     "visualization": 3856,
     "api": 645,
     "commands": 1638,

@@ -11,9 +11,7 @@ import numpy as np
 
 from hapticlink.analysis.findings.rendered import recorded_handle
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
-from hapticlink.components.port_space import PLANE, PortSpace
-from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.port_space import PLANE, POINT, PortSpace
 from hapticlink.orchestrator.base.signal_names import (
     APPLIED_TORQUES,
     BOARD_SENT_AT,
@@ -39,7 +37,6 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
-from hapticlink.orchestrator.results.recorded_scene import scene_part
 
 
 def rms(values: Vector) -> float:
@@ -148,12 +145,10 @@ def of_port(results: Results, signal: str) -> Table | None:
 
 
 def space_of(results: Results) -> PortSpace:
-    """That of the ports of a run, by its linkage, or by its device alone."""
-    for name, kind in (("linkage", Linkage), ("device", Device)):
-        if part := scene_part(results, name, kind):
-            space: PortSpace = part.space
-            return space
-    return PLANE
+    """That of the ports of a run, by the units of their third entries, which an SSP has, too."""
+    of_point = {POINT_POSE: "m", HANDLE_POSE: "m", HAND_WRENCH: "N"}
+    units = results.record.units
+    return POINT if any(units.get(f"{s}[3]") == u for s, u in of_point.items()) else PLANE
 
 
 def of_any_shape(results: Results, signal: str) -> Table | None:

@@ -172,16 +172,20 @@ def _on_grid(device: Device, x: Field, y: Field, theta: Field) -> Workspace:
     return Workspace(x, y, theta, margins)
 
 
+_HERE = (0.0, 0.0)
+
+
 def _reach(device: Device) -> tuple[Field, float]:
-    """The ground's joint (m, 2) from which joints of the tree lead to the handle, and the sum (m)
-    of all lengths on the way."""
+    """The ground's joint (m) from which joints of the tree lead to the handle, and the sum (m) of
+    all lengths on the way; of a slide without a range, of all lengths of the device."""
     above, body, point = {j.child: j for j in device.placed}, device.handle.body, device.handle.at
     reach = 0.0
     while True:
         joint = above[body]
         reach += distance(point or (0.0, 0.0), joint.at_child or (0.0, 0.0))
         if joint.type == "prismatic":
-            reach += max(map(abs, joint.range or (0.0,)))
+            every = (distance(j.at_parent or _HERE, _HERE) for j in device.joint)
+            reach += max(map(abs, joint.range)) if joint.range else sum(every)
         body, point = joint.parent, joint.at_parent
         if body == "ground":
             return np.array(point or (0.0, 0.0)), max(reach, 1e-3)
@@ -190,12 +194,16 @@ def _reach(device: Device) -> tuple[Field, float]:
 def extents_along(device: Device) -> list[Range]:
     """The first and the last coordinate (m) along each direction that the device renders, the
     others as at its start."""
+    from scipy.ndimage import label  # slow to load
+
     model, (_, reach) = device_model(device), _reach(device)
     ways = np.linspace(-reach, reach, POINTS)
     start, found = model.start_pose, list[Range]()
     for along in np.array(model.directions.rows):
         margins = margin(device, start + np.outer(ways, along))
-        found.append(_ends(along @ start + ways, margins))
+        parts, _ = label(margins >= 0)
+        own = parts == parts[POINTS // 2]  # not where the device is assembled otherwise
+        found.append(_ends(along @ start + ways, np.where((margins < 0) | own, margins, -np.inf)))
     return found
 
 

@@ -121,3 +121,13 @@ def test_the_distance_grows_with_the_period_of_the_frames():
     assert slow < 10.0
     assert slow / usual == pytest.approx(3.0, rel=0.1)
     assert usual / fast == pytest.approx(2.0, rel=0.1)
+
+
+def test_an_exported_loop_has_the_bits_and_the_lengths_of_its_scene(tmp_path):
+    path = tmp_path / "bar.toml"
+    path.write_text(BAR % "ideal-3")
+    ours, theirs = hl.run(path), hl.run(hl.export(path, out=tmp_path / "bar.ssp"))
+    x = "haptic_device.x_true"
+    np.testing.assert_array_equal(ours[x], theirs[x])
+    np.testing.assert_array_equal(ours.tracking(), theirs.tracking())
+    assert not theirs.tracking().angle_rad.any()

@@ -81,8 +81,3 @@ def test_an_equilibrium_in_space_is_judged_in_its_own_hand(tmp_path):
 def test_what_is_of_the_plane_is_refused(scene, made, message):
     with pytest.raises(InputFault, match=message):
         made(scene)
-
-
-def test_a_run_in_space_is_not_replayed(pushed):
-    with pytest.raises(InputFault, match="its linkage is in space, and pages and replays draw the"):
-        hl.view(pushed)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.components.device.models import device_model
+from hapticlink.components.device.workspace import extents_along
 from tests.devices import device
 
 ARM, SHIN, C, D, E, F, R, S = 0.060, 0.1025, 0.01443, 0.01125, 0.01125, -0.025, 0.0400, -0.02309
@@ -82,3 +83,15 @@ def test_kinematics_and_inertia_of_a_serial_arm_are_those_that_are_printed(q):
     back = np.linalg.inv(J)
     wanted = back.T @ printed_inertia(q) @ back
     np.testing.assert_allclose(np.array(M), wanted, rtol=0, atol=1e-7 * np.abs(wanted).max())
+
+
+def test_the_workspace_of_a_delta_is_told_about_its_start_alone():
+    """Along its axis the angles of its three arms are the same: their ranges are its ends, and not
+    those where the arms are assembled on the other side of the base; to a part of a cell of the
+    grid, 1 cm or a sixth of a radian."""
+    spec = device("falcon")
+    *_, (low, high) = extents_along(spec)
+    for at, angle in ((low, -0.5), (high, 1.2)):
+        assert arm_angle(np.array([0.0, 0.0, at + 0.12]), math.radians(15)) == pytest.approx(
+            angle, abs=0.12
+        )
