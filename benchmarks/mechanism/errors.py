@@ -234,7 +234,7 @@ def tip_of_bennett(end: float) -> tuple[np.ndarray, float]:
     terms = Terms(falling(bennett()))
 
     def f(_: float, x: np.ndarray) -> np.ndarray:
-        q, slope, bend = mechanisms.bennett_motion(x[0])
+        q, slope, bend = mechanisms.bennett_motion(float(x[0]))
         at = terms.at(q, slope * x[1])
         pulls = at["nle"] + at["D"] @ bend * x[1] ** 2
         return np.array([x[1], -(slope @ pulls) / (slope @ at["D"] @ slope)])
@@ -244,7 +244,7 @@ def tip_of_bennett(end: float) -> tuple[np.ndarray, float]:
     for accuracy in (1, 10):
         tolerance = TOLERANCE | {"rtol": 1e-13 * accuracy}
         theta = solve_ivp(f, (0, end), start, **tolerance).y[0, -1]
-        found.append(terms.at(mechanisms.bennett_motion(theta)[0], np.zeros(3))["x_h"])
+        found.append(terms.at(mechanisms.bennett_motion(float(theta))[0], np.zeros(3))["x_h"])
     return found[0], float(np.linalg.norm(found[0] - found[1]))
 
 
