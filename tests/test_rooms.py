@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16488,
     "programs": 1027,
     "analysis": 9100,
-    "visualization": 3785,
+    "visualization": 3784,
     "api": 635,
     "commands": 1619,
 }

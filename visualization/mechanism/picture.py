@@ -179,7 +179,7 @@ def directions_in_space() -> ca.Function:
     rest, basis = ca.reshape(p, 3, 3), []
     for _ in range(3):
         longest = ca.mmax(ca.diag(rest))
-        column = ca.SX.zeros(3)
+        column = ca.SX(3, 1)
         for k in reversed(range(3)):  # the first of several that are as long
             column = ca.if_else(rest[k, k] >= longest, rest[:, k], column)
         is_one = longest > LEAST_SHARE
