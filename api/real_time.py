@@ -26,10 +26,12 @@ class RealTime(LiveRun):
         out: str | Path | None = None,
         tables: bool = True,
         every: float = 0.02,
+        figures: bool = True,
     ) -> Run:
         """Run the scene to its duration, or until `stop`; results as of `hl.run`. After a `reset`
         they are those from then on. Without `out` and `tables` they have no tables. Turns come
         about `every` so many seconds."""
+        drawn = ("png",) if figures else ()
         return self._repeated(
-            turn, every, lambda pace: runs.run_paced(self.scene, out, pace, tables=tables)
+            turn, every, lambda pace: runs.run_paced(self.scene, out, pace, drawn, tables=tables)
         )

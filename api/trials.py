@@ -19,6 +19,7 @@ from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import flat
+from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization import figure_files
 from hapticlink.visualization.figures import trial_figure
 
@@ -104,25 +105,33 @@ def trial(
     read = open_scene.load(scene, options)
     if device is not None:
         read = open_scene.load(read, runs.with_board(device))
-    if feel is None and not driver_of(read, ""):
-        raise InputFault("trial: nobody feels a simulated device: give --device PORT")
+    board = driver_of(read, "")
+    if feel is None and not board:
+        raise InputFault(
+            "trial: nobody feels a simulated device: give --device PORT, or --page to pull it with "
+            "the mouse"
+        )
     asked = BlindTrial.of(vary)
     scenes = [  # all are refused before the first is felt
         open_scene.load(read, [f"{key}={value}" for key, value in setting.items()])
         for setting in asked.settings
     ]
+    begin = "handle at its start?" if board else "ready?"
+    for each in (read, *scenes):  # so that none takes longer to begin
+        with build_system(each):
+            pass
     reference = dict(flat(read.tables())).get(asked.level) if asked.level else None
     folder = folders.ensure(Path(out))
 
     def present(number: int, place: int, settings: Settings) -> None:
         index = asked.settings.index(settings) if settings else None
-        if ask(f"trial {number}, {place} of 2: handle at its start? [y/q]", "y/q") == STOP:
+        if ask(f"trial {number}, {place} of 2: {begin}", "y/q") == STOP:
             raise EndOfTrials
         shown = read if index is None else scenes[index]
         (feel or _run)(shown, folder / FELT / f"{number:03d}-{place}")
 
     def answered(number: int) -> int | None:
-        given = ask("which of the two was the varied one? [1/2/q]", "1/2/q")
+        given = ask("which of the two was the varied one?", "1/2/q")
         return None if given == STOP else int(given)
 
     with suppress(EndOfTrials):

@@ -67,7 +67,8 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             progress(rule, number * len(RULES) + i, times * len(RULES))
             if (rule, number) not in rests:
                 rests.add(rule, number, *_rest(rule, delay))
-    return page(*([*each.rows.values()] for each in (ticks, ways, rests)), seconds, command)
+    found = [[*rows.rows.values()] for rows in (ticks, ways, rests)]
+    return page(found[0], found[1], found[2], seconds, command)
 
 
 # --- ticks ----------------------------------------------------------------------------------
@@ -152,9 +153,10 @@ def _round_trips(way: str) -> Iterator[object]:
 
 # --- torque after an end ----------------------------------------------------------------------
 
-RESTS = ("rule", "number", "ms", "repeated")
-"""Of an injection: the time (ms) from it to the board's motors without torque, and the number of
-runs before it that ended by themselves."""
+RESTS = ("rule", "number", "ms", "repeated", "latest", "load")
+"""Of an injection: the time (ms) from it to the board's motors without torque, the number of runs
+before it that ended by themselves, and how late (ms) cyclictest of the loop's priority woke at most
+in the seconds of its run."""
 PROGRAM = """
 import sys, time
 from hapticlink.orchestrator.boards.open_kit import OpenKit
@@ -215,17 +217,18 @@ OpenKit.receive = deaf
 """How runs are ended: a signal, or what is put into their program."""
 
 
-def _rest(rule: str, delay: float) -> tuple[float, int]:
+def _rest(rule: str, delay: float) -> tuple[float, int, float, float]:
     """Time (ms) from what ends a run, a time (s) after its first torques, until the motors have no
-    torque by the log of the board, and how many runs before ended by themselves."""
+    torque by the log of the board, and the rest of RESTS."""
     for repeated in range(TRIES):
-        with temporary_folder() as room:
+        with temporary_folder() as room, cyclictest.beside(1000, PRIORITY) as latencies:
             since, rows = _injected(RULES[rule], delay, room)
+        latest = max((1e-3 * each.largest for each in latencies), default=math.nan)
         before = [any(torques) for now, *torques in rows if now <= since]
         after = [(now, any(torques)) for now, *torques in rows if now > since]
         if before and before[-1] and after and not after[-1][1]:
             last = max((i for i, (_, there) in enumerate(after) if there), default=-1)
-            return 1e3 * (after[last + 1][0] - since), repeated
+            return 1e3 * (after[last + 1][0] - since), repeated, latest, round(load_average(), 1)
     raise AssertionError(f"{rule}: no run came to its end: the machine is too busy")
 
 
@@ -246,7 +249,8 @@ def _injected(how: str | signal.Signals, delay: float, room: Path) -> tuple[floa
         text = "".join(f"{key} = {toml(value, key)}\n" for key, value in keys.items())
         path.write_text(f'extends = "{SCENE}"\n{text}')
         program = PROGRAM.replace("INJECTION", snippet)
-        command = [sys.executable, "-c", program, path, room / "run", str(delay), str(duration)]
+        given = map(str, (path, room / "run", delay, duration))
+        command = [sys.executable, "-c", program, *given]
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
             assert process.stdout
             if isinstance(how, signal.Signals):
@@ -298,11 +302,14 @@ def page(ticks: Rowed, ways: Rowed, rests: Rowed, seconds: int, command: str) ->
         trips.append([way, every, *middle, largest, long, _share(long, every)])
     after = []
     for rule in RULES:
-        found = [r for r in rests if r["rule"] == rule]
-        times = sorted(float(r["ms"]) for r in found)
-        again = sum(int(r["repeated"]) for r in found)
+        found = sorted((float(r["ms"]), float(r["latest"])) for r in rests if r["rule"] == rule)
+        times = [ms for ms, _ in found]
         ninth = times[math.ceil(0.9 * len(times)) - 1]
-        after.append([rule, len(times), *map(short, (median(times), ninth, times[-1])), again])
+        numbers = (median(times), ninth, *found[-1])
+        after.append([rule, len(times), *map(short, numbers)])
+    again = sum(int(r["repeated"]) for r in rests)
+    loads = [float(r["load"]) for r in rests]
+    machine = [float(r["latest"]) for r in rests]
     trip_heads = "way | trips | p50 | p99 | max | longer than 1/512 s | share (%)"
     lines = (
         "# A board in the loop",
@@ -325,10 +332,15 @@ def page(ticks: Rowed, ways: Rowed, rests: Rowed, seconds: int, command: str) ->
         *table(trip_heads, "lrrrrrr", trips),
         "",
         "Time until all motors are without torque, by the clock and the log of the board, whose "
-        "watchdog is off but in the last row. Again: runs that ended before, and were made once "
-        "more.",
+        "watchdog is off but in the last row; beside the largest time, how late `cyclictest` of "
+        "the same priority woke at most in the seconds of that run. The latest that it woke in a "
+        f"run was {short(median(machine))} ms in the median of all, and {short(max(machine))} at "
+        f"most, at loads of {min(loads):g} to {max(loads):g}. Runs that ended before they were "
+        f"to, and were made once more: {again}.",
         "",
-        *table("after | times | median | 9 of 10 within | largest | again", "lrrrrr", after),
+        *table(
+            "after | times | median | 9 of 10 within | largest | cyclictest then", "lrrrrr", after
+        ),
         "",
     )
     return "\n".join(lines)

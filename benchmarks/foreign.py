@@ -172,21 +172,28 @@ def _comparison(row: Row) -> Comparison:
 
 
 def _equal(rows: Iterable[Row]) -> str:
-    """How many runs are equal, and the largest difference of others relative to the output's
-    largest value."""
-    found = [(row, _comparison(row)) for row in rows]
+    """How many runs are equal at rates that are exact in binary, and the largest difference of
+    others relative to the output's largest value."""
+    found = [(row, _comparison(row)) for row in rows if _is_exact(row)]
     relative = [_relative_difference(row) for row, c in found if not c.equal]
     others = f", others are within {max(relative):.1g} of its largest" if any(relative) else ""
     equal = sum(c.equal for _, c in found)
     return (
-        f"{equal} of {len(found)} runs have every number of an output equal to the last bit{others}"
+        f"{equal} of {len(found)} runs at rates that are exact in binary have every number of an "
+        f"output equal to the last bit{others}"
     )
 
 
 def _ends_by_event(row: Row) -> bool:
     """Whether an FMU with events differs in its last row alone."""
     found = _comparison(row)
-    return found.events > 0 and found.first == (found.rows - 1) / int(row["rate_hz"])
+    end = (found.rows - 1) / int(row["rate_hz"])
+    return found.events > 0 and found.first == end < float(row["duration_s"])
+
+
+def _is_exact(row: Row) -> bool:
+    """Whether communication points are exact in binary."""
+    return math.log2(int(row["rate_hz"])).is_integer()
 
 
 def _explicit_steps(row: Row) -> float:
@@ -304,7 +311,7 @@ def _causes(compared: list[Row]) -> Iterator[str]:
     mode in which FMPy sets inputs, and steps of the solver for model exchange."""
     unequal = [row for row in compared if not _comparison(row).equal]
     differ = [row for row in unequal if row["interface"] != "model-exchange"]
-    exact = [row for row in differ if math.log2(int(row["rate_hz"])).is_integer()]
+    exact = [row for row in differ if _is_exact(row)]
     files = {row["file"] for row in exact}
     if inexact := [row for row in differ if row["file"] not in files]:
         names = _listed(sorted({f"{_name(row)}" for row in inexact}))
@@ -313,8 +320,9 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             f"**Differences of {names}** come from rounded communication points: k/100 s, "
             "say, is no binary number. hapticlink gives each step the size h, and the "
             "nearest number to k h to begin at. FMPy gives the difference of two rounded times: "
-            f"6 h - 5 h is not h. They begin at {first:g} s or later and disappear at the power of "
-            "two next to the rate, where both call the FMU with the same bits."
+            f"6 h - 5 h is not h, which may also move a jump by a step. They begin at {first:g} s "
+            "or later and disappear at the power of two next to the rate, where both call the FMU "
+            "with the same bits."
         )
         yield ""
     if exact:
@@ -332,8 +340,10 @@ def _causes(compared: list[Row]) -> Iterator[str]:
             f"{told.pop()} that do not set `completedIntegratorStepNotNeeded` are told of each "
             "step by hapticlink, whose steps therefore end at communication points, and of "
             "communication points alone by FMPy: two results within the solver's tolerance, which "
-            "[approach each other](#by-tolerance) as it is tightened. Others differ by rounded "
-            "communication points only."
+            "[approach each other](#by-tolerance) as it is tightened. So do those with time "
+            "events, before which the solver stops here and is interpolated in FMPy, and those "
+            "with event indicators whose inputs change, which is an event here. Others differ by "
+            "rounded communication points only."
         )
         yield ""
     if ended := sorted({_name(row) for row in exchange if _ends_by_event(row)}):

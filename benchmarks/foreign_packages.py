@@ -108,6 +108,7 @@ def _fetch_files(
         command = ["git", "-C", str(copy), *options]
         return subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout
 
+    shutil.rmtree(copy, ignore_errors=True)
     copy.mkdir()
     git("init", "--quiet")
     git("remote", "add", "origin", f"https://github.com/{repository}")

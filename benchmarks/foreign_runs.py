@@ -80,7 +80,8 @@ class Case:
     @property
     def settings(self) -> str:
         given = {**self.start, **({"tolerance": self.tolerance} if self.tolerance else {})}
-        return ", ".join(f"{name} = {value}" for name, value in given.items())
+        short = {n: v if isinstance(v, list) else f"{v:g}" for n, v in given.items()}
+        return ", ".join(f"{name} = {value}" for name, value in short.items())
 
 
 def choose_experiment(path: Path) -> tuple[tuple[int, ...], float]:

@@ -1,7 +1,8 @@
 from __future__ import annotations
 
+import secrets
 import sys
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
@@ -15,6 +16,7 @@ from hapticlink.commands.options import (
     default_folder,
     title,
 )
+from hapticlink.commands.page_server import Browser, Host, Port, port_of, show, start_server
 from hapticlink.commands.run import Device
 from hapticlink.commands.sweep import Vary
 from hapticlink.orchestrator.base.errors import InputFault
@@ -29,6 +31,10 @@ Stairs = Annotated[
     ),
 ]
 Seed = Annotated[int, Parameter(help="Of the order of trials.")]
+OnPage = Annotated[
+    bool,
+    Parameter(name="--page", negative="", help="Feel and answer on a page, where the mouse pulls."),
+]
 
 
 def trial(
@@ -41,11 +47,16 @@ def trial(
     repeats: Repeats = 10,
     staircase: Stairs = False,
     seed: Seed = 0,
+    page: OnPage = False,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    browser: Browser = True,
     format: Format = "png",
     output: Output = PRINTED,
 ) -> int:
-    """Let somebody feel settings of a scene on a board, blindly: in each trial the scene as it is
-    and one of the settings of --vary, in an order that is drawn; then it asks which was varied.
+    """Let somebody feel settings of a scene on a board or on a page, blindly: in each trial the
+    scene as it is and one of the settings of --vary, in an order that is drawn; then it asks which
+    was varied.
 
     Each is felt for the scene's duration, from where it starts. Writes answers.csv, a row for each
     trial, shares.csv, trial.png and what was felt, `felt/001-1/` and so on, to OUT (default
@@ -57,6 +68,7 @@ def trial(
         hapticlink trial closed-loop --device /dev/ttyACM0 --vary graphics.rate=8,12,18,26,40
         hapticlink trial closed-loop --device /dev/ttyACM0 --vary hold=zoh,foh --vary
         graphics.rate=8,12,18,26,40 --staircase --seed 3
+        hapticlink trial closed-loop-direct --page --vary graphics.rate=8,12,18,26,40
     """
     from hapticlink.api.trials import trial as hold_trial
 
@@ -65,21 +77,38 @@ def trial(
             "trial: give the settings that are compared with the scene, --vary key=values"
         )
     folder = output.out or default_folder("trials", scene)
+    how: dict[str, Any] = {
+        "repeats": repeats, "staircase": staircase, "seed": seed, "out": folder, "format": format,
+    }  # fmt: skip
+    if not page:
+        result = hold_trial(scene, vary, changes.options, device=device, ask=_ask, **how)
+    else:
+        import hapticlink as hl
+        from hapticlink.api.runs import with_board
+        from hapticlink.orchestrator.scene.overrides import write_options
+        from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
+        from hapticlink.visualization.live_page.trial_page import TrialPage
 
-    def ask(question: str, answers: str) -> str:
-        while True:
-            say(question, file=sys.stderr)
-            line = sys.stdin.readline()
-            given = line.strip().lower()
-            if not line:
-                return "q"
-            if given in answers.split("/"):
-                return given
-
-    result = hold_trial(
-        scene, vary, changes.options, device=device, repeats=repeats, staircase=staircase,
-        seed=seed, out=folder, format=format, ask=ask,
-    )  # fmt: skip
+        options = (*changes.options, *write_options(with_board(device) if device else {}))
+        read = load_viewed_scene(scene, options, hl.scene(scene, options).duration)
+        token = secrets.token_urlsafe(16)
+        with start_server(host, port, token) as link:
+            show(read.title, host, port_of(link, host, port), token, browser)
+            shown = TrialPage(link, hl.RealTime, read)
+            result = hold_trial(read, vary, ask=shown.ask, feel=shown.feel, **how)
+            shown.tell(f"{result}: the trials have ended")
     lines = [*result.lines(), f"{folder}/: {', '.join(result.files)}"]
     output.show(f"{title(scene)}: {result}", lines, result.record())
     return 0
+
+
+def _ask(question: str, answers: str) -> str:
+    """Ask in the terminal."""
+    while True:
+        say(f"{question} [{answers}]", file=sys.stderr)
+        line = sys.stdin.readline()
+        given = line.strip().lower()
+        if not line:
+            return "q"
+        if given in answers.split("/"):
+            return given

@@ -1,55 +1,41 @@
 from __future__ import annotations
 
-import os
 import secrets
-import sys
 import time
-import webbrowser
 from contextlib import ExitStack, suppress
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-from cyclopts import Parameter, validators
+from cyclopts import Parameter
 
 from hapticlink.commands import completion
 from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
+from hapticlink.commands.page_server import (
+    Browser,
+    Host,
+    Port,
+    port_of,
+    ports,
+    say_refused,
+    show,
+    start_server,
+)
 from hapticlink.commands.progress import waiting
 from hapticlink.commands.run import Device
 from hapticlink.commands.stop_key import wait_for_enter
-from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.errors import Fault, InputFault, Interrupted
+from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
 from hapticlink.orchestrator.scene.blocks import driver_of
 
-if TYPE_CHECKING:
-    from hapticlink.visualization.live_page.server_pipe import ChildProcess
-
-PORT = 8512
-"""Of a page, where no other is asked for."""
-SCREENS = ("DISPLAY", "WAYLAND_DISPLAY")
-"""Variables of the environment that a screen sets, where it is neither Windows nor macOS."""
 FIRST = "closed-loop-direct"
 """The scene that is shown where none is named: in it the rate is felt."""
 WAIT = 0.1
 """Time (s) between two looks for Ctrl-C."""
-Host = Annotated[
-    str,
-    Parameter(help="Address to serve on; another one admits whoever knows the URL."),
-]
-Port = Annotated[
-    int | None,
-    Parameter(
-        help="Port to serve on; by default 8512, or a free one if taken.",
-        validator=validators.Number(gte=0, lte=65535),
-    ),
-]
 Speed = Annotated[
     float, Parameter(help="Simulated seconds in one of the wall clock: 0.2 is slow motion.")
 ]
-Browser = Annotated[bool, Parameter(help="Open the page in the browser.")]
 Second = Annotated[str | None, Parameter(help="Folder of a second run, beside the first.")]
 Export = Annotated[
     Path | None,
@@ -127,18 +113,20 @@ def view(
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
-    with _server(host, port, token, *second_run) as link:
+    with start_server(host, port, token, *second_run) as link:
         import hapticlink as hl
-        from hapticlink.api.board_start import start_at_handle
         from hapticlink.api.runs import with_board
         from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
         board = write_options(with_board(device)) if device else ()
         read = load_viewed_scene(scene, (*changes.options, *board))  # while the server starts
-        read = start_at_handle(read, wait_for_enter)
-        served_port = _port(link, host, port)
-        _show(read.title, host, served_port, token, browser)
+        if driver_of(read, ""):
+            from hapticlink.api.board_start import start_at_handle  # slow to load
+
+            read = start_at_handle(read, wait_for_enter)
+        served_port = port_of(link, host, port)
+        show(read.title, host, served_port, token, browser)
         hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"
         say(f"  {hand} the hand, in place of the scene's; Ctrl-C ends it")
         from hapticlink.visualization.live_and_standalone.offered_controls import SPEED
@@ -185,10 +173,10 @@ def _replay(
     html, token = replay_page.html(runs), secrets.token_urlsafe(16)
     with ExitStack() as pages, suppress(Interrupted):
         try:
-            at = pages.enter_context(serve.serve_page(html, host, _ports(port), token))
+            at = pages.enter_context(serve.serve_page(html, host, ports(port), token))
         except OSError as error:
-            raise InputFault(_say_refused(host, port, error)) from None
-        _show(" beside ".join(folders), host, at, token, browser)
+            raise InputFault(say_refused(host, port, error)) from None
+        show(" beside ".join(folders), host, at, token, browser)
         say("  a replay, with a time slider; Ctrl-C ends it")
         while True:
             interrupt.raise_if_interrupted()
@@ -201,43 +189,3 @@ def _is_scene(name: str) -> bool:
     import hapticlink as hl
 
     return name in hl.shipped() and not (Path(name) / "run.json").exists()
-
-
-def _server(host: str, port: int | None, *arguments: str) -> ChildProcess:
-    """The page's server, which begins to start."""
-    if not find_spec("websockets"):
-        raise InputFault(f"the page needs the package websockets: {install_command('view')}")
-    from hapticlink.visualization.live_page.server_pipe import ChildProcess
-
-    return ChildProcess("hapticlink.visualization.live_page.server", host, _ports(port), *arguments)
-
-
-def _port(link: ChildProcess, host: str, port: int | None) -> int:
-    """The port that the server listens on. Raises InputFault where it cannot."""
-    if (first := link.first()) is None:
-        raise Fault("the page's server does not start")
-    if "error" in first:
-        raise InputFault(_say_refused(host, port, first["error"]))
-    return int(first["port"])
-
-
-def _ports(port: int | None) -> tuple[int, ...]:
-    """Those of which the first free one is taken; 0 is any."""
-    return (PORT, 0) if port is None else (port,)
-
-
-def _show(title: str, host: str, port: int, token: str, browser: bool) -> None:
-    """Say the page's address, and open it in a browser that would open a window of its own, and not
-    take over the terminal."""
-    url = f"http://{f'[{host}]' if ':' in host else host}:{port}/{token}/"
-    say(f"{title}: {url}")
-    sys.stdout.flush()
-    screen = sys.platform in ("win32", "darwin") or any(map(os.environ.get, SCREENS))
-    if browser and screen:
-        webbrowser.open(url)
-
-
-def _say_refused(host: str, port: int | None, why: object) -> str:
-    """That the address cannot be served on."""
-    asked = f"--host {host}" if port is None else f"--host {host} --port {port}"
-    return f"{asked}: {why}: choose another"

@@ -90,8 +90,8 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
 
 def describe_scene(scene: Scene) -> dict[str, Any]:
     """What depends on the start values in the scene."""
-    options = list(scene.source.options) if scene.source else []
-    return {"scene": scene.tables(), "options": options}
+    source = scene.source
+    return {"scene": scene.tables(), "options": [*source.options] if source else []}
 
 
 def _find_idle_holds(scene: Scene, system: System) -> Iterator[str]:

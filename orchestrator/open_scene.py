@@ -55,15 +55,12 @@ def _find(scene: str) -> Source:
     if scene.endswith(SUFFIX):
         tables = read_state(FilePath(scene))["scene"]
         return Source(tables["title"], tables | {"resume": scene}, {})
-    if scene.endswith(".ssp"):
-        # Imported here, since its XML parsers are slow to load.
-        from hapticlink.orchestrator.ssp import read as ssp
+    if scene.endswith((".ssp", ".xml")):
+        # Imported here, since their XML parsers are slow to load.
+        from hapticlink.orchestrator.ssp import osp, read
 
-        return Source(scene, ssp.tables(FilePath(scene)), {})
-    if scene.endswith(".xml"):
-        from hapticlink.orchestrator.ssp import osp
-
-        return Source(scene, osp.tables(FilePath(scene)), {})
+        tables = (read if scene.endswith(".ssp") else osp).tables(FilePath(scene))
+        return Source(scene, tables, {})
     name, text, folder = find_scene(scene)
     return Source(name, *document(text, name, folder))
 

@@ -138,7 +138,7 @@ def attach(
     """The system, whose device that asks for a simulated board gets the port of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    boards = [u for u in system.fmus if u.driver and not u.replayed]
+    boards = [u for u in system.fmus if u.driver and not u.stand_in]
     asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system
@@ -182,11 +182,11 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
         gc.disable()  # nothing below leaves cycles
         stack.enter_context(raise_priority())  # a board has a processor of its own
         while True:
-            ready, _, _ = select.select([end, 0], [], [], 1 / RATE)
+            ready, _, _ = select.select([end.fileno(), 0], [], [], 1 / RATE)
             if 0 in ready and not os.read(0, 1):
                 return
             now = time.monotonic()
-            if end not in ready:
+            if end.fileno() not in ready:
                 board.at(now)
             elif end is listener:
                 end = stack.enter_context(listener.accept()[0])

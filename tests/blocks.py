@@ -51,12 +51,15 @@ class Running:
 
     def set(self, **inputs):
         """Sets inputs, and returns the block."""
+        return self._write(self.component.inputs, self.u, inputs)
+
+    def _write(self, variables, flat, values):
         offset = 0
-        for v in self.component.inputs:
-            if v.name in inputs:
-                self.u[offset : offset + v.size] = np.ravel(inputs.pop(v.name))
+        for v in variables:
+            if v.name in values:
+                flat[offset : offset + v.size] = np.ravel(values.pop(v.name))
             offset += v.size
-        assert not inputs, inputs
+        assert not values, values
         return self
 
     def _named(self, variables, flat):
@@ -73,13 +76,7 @@ class Running:
 
     def put(self, **states):
         """Replaces states, and returns the block."""
-        offset = 0
-        for v in self.component.states:
-            if v.name in states:
-                self.x[offset : offset + v.size] = np.ravel(states.pop(v.name))
-            offset += v.size
-        assert not states, states
-        return self
+        return self._write(self.component.states, self.x, states)
 
     @property
     def y(self):

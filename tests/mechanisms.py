@@ -25,6 +25,20 @@ MOBILITY = np.array(
 """Lambda^-1 of the report's five-bar at rest, Table 6.1, by Pinocchio."""
 
 
+def standing_rod():
+    """The [linkage] of a rod on its end, with friction b in its pivot, and the rate (1/s) at which
+    it falls: J s^2 + b s - m g c = 0."""
+    m, c, J, b = 0.8, 0.04, 1e-3 + 0.8 * 0.04**2, 0.002
+    rod = {
+        "gravity": [0.0, -9.81],
+        "operational_point": {"body": "rod", "at": [0.05, 0.0]},
+        "start": {"pivot": math.pi / 2},
+        "body": [{"name": "rod", "mass": m, "inertia": 1e-3, "center": [c, 0.0]}],
+        "joint": [{"name": "pivot", "child": "rod", "damping": b}],
+    }
+    return rod, max(np.roots([J, b, -m * 9.81 * c]).real)
+
+
 def five_bar(l=TABLE_6_1["l"], m=TABLE_6_1["m"], I=TABLE_6_1["I"], f=(0.5,) * 4, start=Q0):  # noqa: E741
     """The report's closed-loop mechanism (Figure 3.1), f the centre-of-mass fractions."""
     body = tuple(

@@ -17,6 +17,7 @@ from hapticlink.components.specs.linkage import (
 )
 
 __all__ = [
+    "BALL_AND_SLIDER",
     "DELTA",
     "bennett",
     "bricard",
@@ -27,6 +28,35 @@ __all__ = [
     "slider_crank",
     "top",
 ]
+
+BALL_AND_SLIDER = """
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.3] }
+gravity = [0.0, 0.0, 9.81]
+
+[[linkage.body]]
+name = "bar"
+mass = 1.0
+inertia = [0.02, 0.02, 0.001]
+center = [0.0, 0.0, 0.2]
+
+[[linkage.body]]
+name = "block"
+mass = 2.0
+inertia = 0.01
+
+[[linkage.joint]]
+name = "ball"
+type = "spherical"
+child = "bar"
+
+[[linkage.joint]]
+name = "slide"
+type = "prismatic"
+child = "block"
+axis = [1.0, 2.0, 2.0]
+"""
+"""The [linkage] of a scene: a bar on a ball, and a block that slides beside it."""
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 

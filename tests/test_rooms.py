@@ -30,14 +30,14 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7490,
+    "components": 7498,
     "fmus": 2992,
-    "orchestrator": 16488,
+    "orchestrator": 16519,
     "programs": 1027,
-    "analysis": 9100,
-    "visualization": 3784,
-    "api": 635,
-    "commands": 1619,
+    "analysis": 9106,
+    "visualization": 3855,
+    "api": 645,
+    "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

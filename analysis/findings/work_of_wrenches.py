@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from fractions import Fraction
+from functools import reduce
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +94,7 @@ def work_as_held(
 
     def steps(block: Table) -> Vector:
         place = block[position]
-        work: Vector = (force_at(rows_of(block)) * (place[1:] - place[:-1])).sum(axis=1)
-        return work
+        return _dot(force_at(rows_of(block)), place[1:] - place[:-1])
 
     return _at(times, moved["time"], _sums(len(moved.rows), steps, moved))
 
@@ -114,10 +114,16 @@ def work_of_source(
             at_stamps = np.stack([np.interp(block["time"], path, x) for x in place.T], axis=1)
         force = _signed(sign, block[signal])
         mean = (force[:-1] + force[1:]) / 2
-        work: Vector = (mean * (at_stamps[1:] - at_stamps[:-1])).sum(axis=1)
-        return work
+        return _dot(mean, at_stamps[1:] - at_stamps[:-1])
 
     return _at(times, wrench["time"], _sums(len(wrench.rows), steps, wrench))
+
+
+def _dot(force: Vector, moved: Vector) -> Vector:
+    """The products of rows, each summed: column by column, since NumPy's sum along a short axis
+    takes six times as long, to the same bits."""
+    work: Vector = reduce(np.add, (force * moved).T, 0.0)
+    return work
 
 
 def _signed(sign: float, force: Vector) -> Vector:
@@ -131,7 +137,7 @@ def absolute_work(results: Results, signal: str, position: str) -> float:
     assert moved
 
     def steps(block: Table) -> Vector:
-        return np.abs((block[signal][:-1] * np.diff(block[position], axis=0)).sum(axis=1))
+        return np.abs(_dot(block[signal][:-1], np.diff(block[position], axis=0)))
 
     sums = _sums(len(moved.rows), steps, moved)
     return float(sums[-1]) if len(sums) else 0.0

@@ -236,11 +236,14 @@ class ForwardSensitivity:
             J = advanced_powers(hold, float(since))[np.ix_(order, order)]
             E = np.zeros_like(J)
             return Applied(operation, (powers,), (further,), (further,), held, held, J, E)
-        J = self._arrived(tick, operation, call, reach, since)
-        after, before = J.shape
-        by = self._powers(tick, operation, since)[order]
+        arrived = self._arrived(tick, operation, call, reach, since)
+        after, before = arrived.shape
+        by = self._powers(tick, operation, since, after)[order]
         reads = read_by(hold)
-        J = np.block([[J, np.zeros((after, len(reads)))], [by[:, :after] @ J, by[:, after:]]])
+        J = np.zeros((after + len(by), before + len(reads)))
+        J[:after, :before] = arrived
+        np.matmul(by[:, :after], arrived, out=J[after:, :before])
+        J[after:, before:] = by[:, after:]
         return Applied(
             operation,
             (name, powers),
@@ -272,26 +275,28 @@ class ForwardSensitivity:
         known[:] = [Slopes(np.zeros(0), J, np.zeros_like(J))]
         return J
 
-    def _powers(self, tick: int, operation: Evaluate, since: Since) -> Matrix:
-        """The slopes of c_0 to c_d by the numbers of the state of a hold, and by what it reads
-        beside its samples."""
+    def _powers(self, tick: int, operation: Evaluate, since: Since, size: int) -> Matrix:
+        """The slopes of c_0 to c_d by the `size` numbers of the state of a hold, and by what it
+        reads beside its samples."""
         hold, block = (
             self._simulation.holds[operation.connection],
             self._blocks[operation.connection],
         )
-        board, parts = self._simulation.signals.values, hold.parts
-        at = np.concatenate([block.save().numbers, board[read_by(hold)]])
+        board, parts, reads = self._simulation.signals.values, hold.parts, read_by(hold)
         beside = b""
         if parts.beside:
             order, signs = np.argsort(np.argsort(parts.beside.where)), parts.beside.factor
             beside = order.tobytes() + (b"" if signs is None else signs.tobytes())
         base = self._simulation.system.timeline.base
         law = hold.row, parts.relation, parts.matrix, hold.c.n, beside
-        about = *law, len(at), operation.ahead, base
+        about = *law, size + len(reads), operation.ahead, base
         known = self.work.slopes.setdefault((POWERS, *about, since), [])
+        if known and is_linear(hold):
+            return known[0].J
+        at = np.concatenate([block.save().numbers, board[reads]])
         wide = SAME * np.maximum(1.0, np.abs(at))
         for slopes in known:
-            if is_linear(hold) or (np.abs(at - slopes.at) <= wide).all():
+            if (np.abs(at - slopes.at) <= wide).all():
                 return slopes.J
         J = slopes_of_powers(hold, block, board, tick, float(operation.ahead))
         known.insert(0, Slopes(at, J, np.zeros_like(J)))

@@ -51,13 +51,12 @@ class JointCoordinates(DeviceModel):
         if not self.device.loop:
             return q
         kept = ca.SX(self.directions.size, 1)
-        return q - ca.solve(self._matrix(q, p), ca.vertcat(self._at(q, p).h, kept))
+        return q - ca.solve(self._matrix(q, p), ca.vertcat(self._gaps(q, p), kept))
 
     def place_at(self, y: ca.SX, guess: ca.SX, p: Parameters, iterations: int) -> ca.SX:
         q = guess
         for _ in range(iterations):
-            at = self._at(q, p)
-            off = ca.vertcat(at.h, self.directions.pick(at.x_h) - y)
+            off = ca.vertcat(self._gaps(q, p), self.handle(q, p) - y)
             q = q - ca.solve(self._matrix(q, p), off)
         return q
 
@@ -96,16 +95,25 @@ class JointCoordinates(DeviceModel):
         return self.range_rates(z, p)
 
     def _at(self, q: ca.SX, p: Parameters) -> LinkageModel:
-        """The linkage at q: what is not differentiated by q."""
+        """The linkage at q: what neither is differentiated by q nor asks what depends on it."""
         linkage, given = self.device.linkage, cast("Signals", p)  # of which a model reads names
         return LinkageModel(linkage, given, q, ca.SX(q.numel(), 1))
 
     def _matrix(self, q: ca.SX, p: Parameters) -> ca.SX:
         """A."""
         at = self._at(ca.SX.sym("q", q.numel()), p)
-        A = ca.vertcat(at.W, self.directions.pick(at.J_h))
-        (A,) = ca.substitute([A], [at.q], [ca.densify(q)])
-        return A
+        return self._placed(ca.vertcat(at.W, self.directions.pick(at.J_h)), at, q)
+
+    def _gaps(self, q: ca.SX, p: Parameters) -> ca.SX:
+        """h."""
+        at = self._at(ca.SX.sym("q", q.numel()), p)
+        return self._placed(at.h, at, q)
+
+    @staticmethod
+    def _placed(value: ca.SX, at: LinkageModel, q: ca.SX) -> ca.SX:
+        """What is given at the symbols of a linkage, at q."""
+        (placed,) = ca.substitute([value], [at.q], [ca.densify(q)])
+        return placed
 
     def _rates(self, q: ca.SX, p: Parameters) -> ca.SX:
         """B."""

@@ -222,12 +222,12 @@ class PoseCoordinates(DeviceModel):
             phi - turns.side * ca.acos(cos2) + ca.pi + turns.whole[1],
         )
         both = {}
-        for body, pin, anchor, u, (length, side), heading, motion in zip(
-            dyad.bodies, (a, c), (dyad.first, dyad.second), (u1, -u2), own, headings,
-            ((J1, w1, b1), (J2, w2, b2)), strict=True,
+        for body, pin, anchor, elbow, u, (length, side), heading, motion in zip(
+            dyad.bodies, (a, c), (dyad.first, dyad.second), (dyad.first_elbow, dyad.second_elbow),
+            (u1, -u2), own, headings, ((J1, w1, b1), (J2, w2, b2)), strict=True,
         ):  # fmt: skip
             rotation = ca.horzcat(u, across(u)) @ ca.horzcat(side, across(side)).T / length
-            angle = heading - ca.atan2(side[1], side[0])
+            angle = heading - self._heading(anchor, elbow, side)
             local = p.get(anchor.on.parameter)
             both[body] = self._on_pin(pin, local, angle, rotation, *motion)
         return both, Solved(r, along.T @ span, (l1, l2))
@@ -245,6 +245,13 @@ class PoseCoordinates(DeviceModel):
         ends = [p.get(place.parameter, ca.SX.zeros(2)) for place in (anchor.on, elbow)]
         side = ca.SX(ends[1]) - ca.SX(ends[0])
         return ca.norm_2(side), side
+
+    def _heading(self, anchor: Anchor, elbow: PinPlace, side: ca.SX) -> ca.SX:
+        """The heading (rad) of that side in the body's frame, next to that of the device as it is
+        described: of a side along -x a 0 of another sign would be a turn more."""
+        x, y = self._local(elbow) - self._local(anchor.on)
+        turn = ca.atan2(x * side[1] - y * side[0], x * side[0] + y * side[1])
+        return float(np.arctan2(y, x)) + turn
 
     def _all_jacobians(
         self, y: ca.SX, p: Parameters, v: ca.SX | None = None

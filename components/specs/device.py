@@ -127,8 +127,9 @@ class DeviceJoint:
 class DeviceLoop:
     """What closes a loop between two bodies of a device."""
 
-    type: Literal["revolute", "rod"] = "revolute"
-    """revolute: a pin; rod: a link without mass between two balls, of devices in space."""
+    type: Literal["revolute", "spherical", "rod"] = "revolute"
+    """revolute: a pin, in the plane. In space spherical, a ball, and rod, a link without mass
+    between two balls."""
     bodies: tuple[str, str]
     """The two bodies; may be "ground"."""
     at: tuple[Place, Place]

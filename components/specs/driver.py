@@ -24,7 +24,7 @@ class Driver:
     type: Annotated[str, DRIVERS.names()] = "open-kit"
     """The protocol: open-kit, the serial protocol of the open two-motor teaching kit."""
     port: str = ""
-    """The serial port (`/dev/ttyACM0`, `COM3`), the socket of a board behind a network
+    """The serial port (`/dev/ttyACM0`, `COM3`), the socket of a board elsewhere
     (`socket://HOST:PORT`), or `simulated-board`: a board that is a process of this computer, with
     the device and the hand of the scene. Without one, or with `none`, the device is simulated.
     `--device PORT` gives it, too."""

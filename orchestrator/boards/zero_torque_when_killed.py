@@ -26,9 +26,10 @@ try:
 except (AttributeError, OSError):
     pass
 port, shared, message = int(sys.argv[1]), int(sys.argv[2]), bytes.fromhex(sys.argv[3])
-lock = ctypes.c_char.from_buffer(mmap.mmap(shared, 0)) if shared >= 0 else None
+lock = ctypes.c_char.from_buffer(mmap.mmap(shared, 0)) if shared >= 0 else 0
 os.write(1, b"1")
-if lock and ctypes.CDLL(None).pthread_mutex_lock(ctypes.byref(lock)) or not os.read(0, 1):
+died = lock and ctypes.pythonapi.pthread_mutex_lock(ctypes.byref(lock))
+if died or os.read(0, 1) == b"":
     os.write(port, message)
 """
 PRIORITY = 21

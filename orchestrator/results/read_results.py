@@ -30,7 +30,7 @@ BLOCK = 1 << 12
 """Rows of a long run that are in memory at a time."""
 
 
-Entries = tuple[tuple[int, ...], tuple[int, ...]]
+Entries = tuple[Sequence[int], tuple[int, ...]]
 """The columns of the entries of a vector or matrix, and its shape."""
 
 
@@ -64,6 +64,8 @@ class Table(Mapping[str, Vector]):
     def _read(self, places: int | Sequence[int]) -> Vector:
         """Columns; of a file copies, which take less memory than the rows that are mapped."""
         if not isinstance(self.rows, RowsFile):
+            if isinstance(places, range):  # three times as fast as by a list
+                return self.rows[:, places.start : places.stop].copy()
             return self.rows[:, places]
         found = np.empty((*np.shape(places), len(self.rows))).T
         for first in range(0, len(found), BLOCK):
@@ -131,8 +133,14 @@ def _find_columns(columns: tuple[str, ...]) -> tuple[dict[str, int], dict[str, E
         if indices:
             entries.setdefault(name, []).append((indices, place))
     ordered = {name: zip(*sorted(each), strict=True) for name, each in entries.items()}
-    arrays = {name: (places, _shape(indices)) for name, (indices, places) in ordered.items()}
+    arrays = {name: (_span(places), _shape(indices)) for name, (indices, places) in ordered.items()}
     return {column: place for place, column in reversed([*enumerate(columns)])}, arrays
+
+
+def _span(places: Sequence[int]) -> Sequence[int]:
+    """The places as a range, where they are side by side."""
+    span = range(places[0], places[0] + len(places))
+    return span if [*span] == [*places] else places
 
 
 def _shape(indices: Sequence[tuple[int, ...]]) -> tuple[int, ...]:

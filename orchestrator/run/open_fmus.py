@@ -10,7 +10,6 @@ from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.boards.board import Board
-from hapticlink.orchestrator.boards.replayed_board import ReplayedBoard
 from hapticlink.orchestrator.fmi.description import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -80,8 +79,6 @@ class LoadedFmus:
                 opening = fmu.stand_in
             elif fmu.served:
                 opening = partial(Remote, fmu.served)
-            elif fmu.driver and fmu.replayed:
-                opening = partial(ReplayedBoard, fmu.replayed, fmu.driver)
             elif fmu.driver:
                 opening = partial(Board, fmu.driver)
             else:

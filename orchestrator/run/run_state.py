@@ -47,11 +47,6 @@ class RunState:
     def time(self) -> float:
         return float(self.content["time"])
 
-    @property
-    def tables(self) -> dict[str, Any]:
-        """The tables of the scene."""
-        return dict(self.content["scene"])
-
 
 def read(path: Path) -> RunState:
     """Raises InputFault where a file is no state, or was made by another version."""
@@ -145,7 +140,7 @@ def _capture(simulation: Simulation, loop: CompiledLoop) -> dict[str, Any]:
             if c.hold
         },
         "credits": [signals.values[signals.credit(i)] for i in range(len(system.energy.springs))],
-        "blocks": {n: _plain(b.save()) for n, b in state_blocks(simulation).items()},
+        "blocks": {n: vars(b.save()) for n, b in state_blocks(simulation).items()},
         "holds": {name: _capture_hold(hold) for name, hold in simulation.holds.items()},
         "overdrawn": [array(tank.least, 1).copy() for tank in simulation.springs],
         "meters": {name: meter.saved() for name, meter in simulation.meters.of.items()},
@@ -201,10 +196,6 @@ def _capture_hold(hold: CompiledHold) -> dict[str, Any]:
 
 def _capture_change(change: InputChange, setter: InputSetter) -> dict[str, Any]:
     return {"text": change.text, "time": change.time, "begin": change.begin, **setter.saved()}
-
-
-def _plain(saved: Saved) -> dict[str, Any]:
-    return {n: getattr(saved, n) for n in ("integers", "numbers", "counts", "lengths")}
 
 
 # --- plugins' holds ---------------------------------------------------------------------------
@@ -270,8 +261,7 @@ def _put(there: Any, saved: Any) -> Any:
 def require_plain_holds(simulation: Simulation) -> None:
     """Raises InputFault for a plugin's hold with attributes that cannot be saved."""
     for hold in simulation.holds.values():
-        if hold.own:
-            _capture_hold(hold)
+        _capture_hold(hold)
 
 
 # --- go on ------------------------------------------------------------------------------------
@@ -294,7 +284,7 @@ def restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> None
     for name, block in blocks.items():
         if name not in newer:
             kept = saved["blocks"][name]
-            block.restore(Saved(**kept, own={}), kept["numbers"])
+            block.restore(Saved(**kept), kept["numbers"])
     for i, tank in enumerate(simulation.springs):
         array(tank.least, 1)[:] = saved["overdrawn"][i]
     for i, credit in enumerate(saved["credits"]):

@@ -25,7 +25,7 @@ def require_fit(state: RunState, system: System, tables: Mapping[str, Any]) -> N
     """Raises InputFault with all that keeps a scene, of these tables, from going on."""
     if found := [*why_no_fit(state, system)]:
         lines = [f"{state.path}: the scene cannot go on from this state", *found]
-        if other := [*_differences(state.tables, tables)]:
+        if other := [*_differences(state.content["scene"], tables)]:
             more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
             lines.append(f"settings that differ: {', '.join(other[:SHOWN])}{more}")
         raise InputFault("\n  ".join(lines))

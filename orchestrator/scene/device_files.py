@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -52,6 +52,12 @@ def list_devices() -> dict[str, Any]:
     return list_shipped("hapticlink.scenes.devices")
 
 
+@cache
+def _read_shipped(name: str) -> str:
+    text: str = list_devices()[name].read_text(encoding="utf-8")
+    return text
+
+
 def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
     """Name, text and folder of a device file: a path relative to `folder`, or the name of a shipped
     one, which has no folder. Raises InputFault where there is none."""
@@ -59,7 +65,7 @@ def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, Fi
     if text_files.exists(path):
         return str(path), text_files.read_text(path, "a device", LARGEST), path.parent
     if name in known:
-        return name, known[name].read_text(encoding="utf-8"), None
+        return name, _read_shipped(name), None
     raise InputFault(f"{shorten(name)}: neither a file nor a shipped device; {near(name, known)}")
 
 
@@ -120,7 +126,7 @@ def put_device_files(data: Mapping[str, Any], written: Mapping[Path, Place]) -> 
         places |= {
             (*path, *key): place
             for key, place in where.items()
-            if not any(key[:i] in replaced for i in range(1, len(key) + 1))
+            if not (replaced and any(key[:i] in replaced for i in range(1, len(key) + 1)))
         }
         for key, entries in named.items():
             for entry, changes in entries.items():

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import replace
+from functools import lru_cache
 from itertools import compress, islice
 from operator import not_
 from pathlib import Path as FilePath
+from typing import Any
 
 import pydantic
 from pydantic_core import to_json
@@ -53,6 +56,29 @@ def read_scene(
     Raises SceneFault with every finding, InputFault for an option that cannot be applied.
     """
     return from_source(Source(name, *document(text, name, folder), tuple(options)))
+
+
+def _read_tables(data: dict[str, Any]) -> Scene:
+    """The scene of tables. Those of the mechanism and the device are objects that other scenes of
+    the same numbers have, too, so that what follows from them is found once."""
+    shared: dict[str, Any] = {}
+    alone = {"title": "", "duration": 1.0}
+    for key in ("linkage", "device"):
+        if isinstance(data.get(key), dict):
+            with suppress(pydantic.ValidationError):  # which reading the whole tells
+                shared[key] = _read_table(key, _write(alone | {key: data[key]}))
+    rest = {key: table for key, table in data.items() if key not in shared}
+    return replace(adapter().validate_json(_write(rest)), **shared)
+
+
+@lru_cache(32)
+def _read_table(key: str, text: bytes) -> Any:
+    return getattr(adapter().validate_json(text), key)
+
+
+def _write(data: dict[str, Any]) -> bytes:
+    """As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1."""
+    return to_json(data, inf_nan_mode="constants")
 
 
 def from_source(source: Source) -> Scene:
@@ -107,8 +133,7 @@ def from_source(source: Source) -> Scene:
     of_holds, unread_holds = hold_tables.read_hold_tables(data)
     errors, wrong = errors + of_holds, wrong + unread + unread_holds
     try:
-        # As JSON: strict pydantic then takes arrays for tuples, and still refuses "1" for 1.
-        scene = adapter().validate_json(to_json(data, inf_nan_mode="constants"))
+        scene = _read_tables(data)
     except pydantic.ValidationError as error:
         errors += error.errors(include_url=False)
     if wrong := wrong + explain_errors(errors, data):

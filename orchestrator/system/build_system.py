@@ -307,9 +307,28 @@ def _connections(
     rows = haptic_loop.wires(scene, {n: d for n, d in described.items() if n not in own})
     paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
     wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
-    loop = tuple(connect(wires, described, problems))
+    loop = _connect_loop(wires, described, problems)
     problems += check_partial_vectors(asked, rows, described)
     return tuple(c for _, c in (*loop, *asked))
+
+
+Ends = tuple[Sequence[tuple[Keys, Wire]], Mapping[str, Description]]
+_LOOPS: shelf.Shelf[tuple[Ends, tuple[tuple[Keys, Connection], ...]]] = shelf.Shelf(MAX_SYSTEMS)
+
+
+def _connect_loop(
+    wires: Sequence[tuple[Keys, Wire]],
+    described: Mapping[str, Description],
+    problems: list[Problem],
+) -> tuple[tuple[Keys, Connection], ...]:
+    """The haptic loop's connections, which systems of other rates and holds have, too."""
+    ends, found = (wires, described), list[Problem]()
+    known = _LOOPS.take(lambda item: item[0] == ends)
+    known = known or (ends, tuple(connect(wires, described, found)))
+    if not found:
+        _LOOPS.put(known)
+    problems += found
+    return known[1]
 
 
 def _path(wire: Wire, paths: Mapping[str, Keys]) -> Keys:

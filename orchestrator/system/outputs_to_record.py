@@ -20,6 +20,8 @@ def read_recorded(fmu: Fmu, record: RecordTable) -> Fmu:
     """The FMU, of which those variables are recorded that the scene names and that are no outputs:
     locals, inputs, parameters. What only an active clock lets be read is not."""
     named = [] if isinstance(record.signals, str) else record.signals
+    if not named:
+        return fmu
     asked = {s.name for s in fmu.description.scalars if _is_named(fmu.name, s, named)}
     if not asked:
         return fmu

@@ -12,7 +12,6 @@ from typing import Any
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.boards.replayed_board import BoardRecording
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
 from hapticlink.orchestrator.fmi.start_values import Starts
@@ -51,8 +50,6 @@ class Fmu:
     """The board in its place."""
     stand_in: Callable[..., Any] | None = None
     """What makes the `Instance` that runs in its place, by the arguments of one."""
-    replayed: BoardRecording | None = field(default=None, compare=False)
-    """What is read in the board's place."""
 
     @property
     def sampled(self) -> bool:

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import hapticlink as hl
-from hapticlink.orchestrator.scene.device_files import list_devices
 from studies.devices import measure, page
 
 
@@ -52,7 +51,7 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("results/devices"))
     asked = parser.parse_args()
     rows = []
-    for name in list_devices():
+    for name in measure.planar_devices():
         rows.append(row(name))
         print(f"{name}: {rows[-1]['verdict']}", flush=True)
     asked.out.mkdir(parents=True, exist_ok=True)

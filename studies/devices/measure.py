@@ -21,9 +21,12 @@ from hapticlink.components.device.models import device_model
 from hapticlink.components.device.motors_and_encoders import mass_and_count
 from hapticlink.components.device.observer_laws import default_bandwidth
 from hapticlink.components.device.workspace import workspace
+from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, Hand, SpringHand
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
+from hapticlink.orchestrator.scene.device_files import list_devices
+from hapticlink.orchestrator.scene.read_and_check import read_scene
 
 SCENE = "closed-loop-ideal"
 SECONDS, EARLY, LATE = 60.0, (0.25, 2.0), 5.0
@@ -38,6 +41,12 @@ ALONE = 12.0
 COUPLING = 100.0
 """K_pc (N/m) of the scene."""
 Options = dict[str, Any]
+
+
+def planar_devices() -> list[str]:
+    """The shipped devices that render a planar linkage, as that of the scene."""
+    alone = 'title = "a device"\nduration = 1.0\ndevice.extends = "{}"'
+    return [name for name in list_devices() if read_scene(alone.format(name)).space == PLANE]
 
 
 def options(name: str) -> Options:

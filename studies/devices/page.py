@@ -66,9 +66,9 @@ def text(rows: Sequence[dict[str, Any]]) -> str:
         *alone,
         "",
         "With bias full and ideal sensing the law (4.6) asks for the acceleration that the "
-        "mechanism has, which has no part along constrained directions: errors of sampling alone "
-        "push the handle that way, so that it stays near for some seconds without a topology "
-        "controller. With velocity terms left out, or with observed forces, it leaves sooner.",
+        "mechanism has, which has no part along constrained directions: without a topology "
+        "controller errors of sampling alone push the handle that way, slowly. With velocity terms "
+        "left out, or with observed forces, more does.",
         "",
         "## Verdicts and runs",
         "",
@@ -96,10 +96,8 @@ def _rendered(row: dict[str, Any]) -> str:
 
 
 def _error(distance: float, reason: str, time: float) -> str:
-    if reason == "duration":
-        return short(distance)
-    why = "where the handle leaves the workspace" if reason == "stop_when" else reason
-    return f"{short(distance)} until {time:.3g} s, {why}"
+    ends = {"duration": "", "stop_when": f" (left at {time:.3g} s)"}
+    return f"{short(distance)}{ends.get(reason, f' ({reason} at {time:.3g} s)')}"
 
 
 def _check(row: dict[str, Any], check: dict[str, Any]) -> str:

@@ -56,3 +56,68 @@ def test_an_observer_beside_the_device_is_the_one_in_it():
     for signal in ("virtual_mechanism.x", "haptic_device.x_true"):
         assert beside[signal] == pytest.approx(inside[signal], rel=0, abs=1e-12)
     assert math.isfinite(inside["haptic_device.F_hand_observed"].max())
+
+
+BAR = """
+title = "A bar on a universal joint, in the hand"
+duration = 0.25
+graphics.rate = 32
+
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.1] }
+
+[[linkage.body]]
+name = "bar"
+mass = 0.3
+inertia = 1e-3
+center = [0.0, 0.0, 0.05]
+
+[[linkage.joint]]
+name = "joint"
+type = "universal"
+child = "bar"
+at_parent = [0.0, 0.0, -0.1]
+axis = [1.0, 0.0, 0.0]
+second_axis = [0.0, 1.0, 0.0]
+
+[controller]
+bias = "full"
+
+[controller.teleoperation]
+stiffness = [200.0, 200.0, 200.0]
+damping = [20.0, 20.0, 20.0]
+
+[hand]
+type = "constant"
+wrench = [0.2, -0.1, 0.3]
+
+[device]
+extends = "%s"
+"""
+
+
+@pytest.mark.parametrize("name", ["ideal-3", "falcon", "phantom-premium"])
+def test_a_bar_is_felt_alike_through_every_device(name, tmp_path):
+    """The handle follows the bar's end, whatever the device: within a hundredth of its way."""
+    path = tmp_path / "bar.toml"
+    path.write_text(BAR % name)
+    found = hl.run(path)
+    way = np.linalg.norm(np.diff(found["virtual_mechanism.x"], axis=0), axis=1).sum()
+    assert found.run["end"]["reason"] == "duration"
+    assert way > 0.02
+    assert found.tracking().distance_mm.max() < 10 * way
+    assert np.linalg.norm(found["haptic_device.x_true"] - [0, 0, -0.1], axis=1) == pytest.approx(
+        0.1, abs=0.01 * way
+    )
+
+
+def test_the_distance_grows_with_the_period_of_the_frames():
+    """Without weight the hand's 0.2 N meet the mobility of the frame before alone: micrometres, in
+    proportion to the period of the frames."""
+    hand = {"type": "constant", "wrench": [-0.2, 0.0, 0.0]}
+    options = {"linkage.gravity": [0.0, 0.0, 0.0], "hand": hand}
+    runs = [hl.run("closed-loop-bricard", {**options, "graphics.rate": f}) for f in (10, 30, 60)]
+    slow, usual, fast = (1e3 * run.tracking().distance_mm.max() for run in runs)
+    assert slow < 10.0
+    assert slow / usual == pytest.approx(3.0, rel=0.1)
+    assert usual / fast == pytest.approx(2.0, rel=0.1)

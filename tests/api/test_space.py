@@ -8,38 +8,15 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.findings.forces import wrenches
 from hapticlink.orchestrator.base.errors import InputFault
+from tests.spatial_linkages import BALL_AND_SLIDER
 
-SCENE = """
+SCENE = f"""
 title = "A bar on a ball, and a slider across"
 duration = 0.5
 haptics.rate = 64
-
-[linkage]
-operational_point = { body = "%s", at = [0.0, 0.0, 0.3] }
-gravity = [0.0, 0.0, 9.81]
-start_velocity = { ball = [1.0, -2.0, 3.0] }
-
-[[linkage.body]]
-name = "bar"
-mass = 1.0
-inertia = [0.02, 0.02, 0.001]
-center = [0.0, 0.0, 0.2]
-
-[[linkage.body]]
-name = "block"
-mass = 2.0
-inertia = 0.01
-
-[[linkage.joint]]
-name = "ball"
-type = "spherical"
-child = "bar"
-
-[[linkage.joint]]
-name = "slide"
-type = "prismatic"
-child = "block"
-axis = [1.0, 2.0, 2.0]
+{BALL_AND_SLIDER}
+[linkage.start_velocity]
+ball = [1.0, -2.0, 3.0]
 
 [hand]
 type = "spring"
@@ -52,7 +29,7 @@ target = [[0.0, 0.1, 0.2, 0.25]]
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     path = tmp_path_factory.mktemp("space") / "bar.toml"
-    path.write_text(SCENE % "bar")
+    path.write_text(SCENE)
     return path
 
 
@@ -83,11 +60,12 @@ def test_an_equilibrium_in_space_is_judged_in_its_own_hand(tmp_path):
     """m s'' = -(a' K a) s - (a' B a) s' along the unit vector a of a slider, with F held for T:
     a' K a T/2 is taken off the damping."""
     path = tmp_path / "block.toml"
-    path.write_text((SCENE % "block").replace("gravity = [0.0, 0.0, 9.81]\n", ""))
+    path.write_text(SCENE)
     a, K, B = np.array([1, 2, 2]) / 3, np.array([50, 100, 150]), np.array([2, 4, 4])
     ball = {"linkage.joint.ball.type": "revolute", "linkage.joint.ball.stiffness": 1.0}
     ball |= {"linkage.joint.ball.damping": 0.1, "linkage.start_velocity": {}}
-    judged = hl.equilibrium_stability(path, {**ball, "haptics.rate": 1000})
+    slider = {"linkage.operational_point.body": "block", "linkage.gravity": [0.0, 0.0, 0.0]}
+    judged = hl.equilibrium_stability(path, {**ball, **slider, "haptics.rate": 1000})
     decay = (a @ (B * a) - a @ (K * a) / 1000 / 2) / 2 / 2
     assert judged.verdict == "stable"
     assert judged.growth == pytest.approx(-decay, rel=0.02)

@@ -70,6 +70,9 @@ CASES = {
     "observer beside": ("closed-loop", f"{HALF}; device.observer.beside=true"),
     "kalman": ("closed-loop", f"{HALF}; device.observer.law=kalman; haptics.rate=600"),
     "mean": ("two-users", "duration=0.2; downsampling=mean"),
+    "in space": (
+        "closed-loop-bricard", "duration=0.25; graphics.rate=10; hold=foh; sensing=encoders",
+    ),
 }  # fmt: skip
 """Scenes, and their options, each after "; "."""
 

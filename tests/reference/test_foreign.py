@@ -1,17 +1,20 @@
 """The short form of `hapticlink bench foreign`, with FMUs that pythonfmu and pythonfmu3 build, the
 package's archives among them, and without a network."""
 
+import dataclasses
+import subprocess
 import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
 
-from benchmarks import foreign
+from benchmarks import foreign, foreign_packages
 from benchmarks.foreign_packages import find_fmus
-from benchmarks.foreign_runs import choose_experiment, choose_inputs, compare
+from benchmarks.foreign_runs import Case, choose_experiment, choose_inputs, compare
 from benchmarks.rows import Rows
 from tests.little_fmus import edited, python_fmu, python_fmu_of
+from tests.orchestrator.c_fmus import equations_fmu
 
 LAG = "self.y += size * (self.u + self.gain - self.y)"
 LAG3 = """
@@ -46,6 +49,19 @@ def test_both_tools_give_the_same_bits_with_an_input_that_changes(tmp_path, fmi)
     assert found.outputs == {"2": 2, "3": 1}[fmi]
 
 
+def test_what_is_stiff_is_measured(tmp_path):
+    """dx/dt = u - k x decays with k."""
+    case = Case("model-exchange", {"k": 1e5, "level": -1e9, "top": 1e9}, 1e-6)
+    found = compare(equations_fmu(tmp_path), 64, 1.0, tmp_path, case=case)
+    assert (found.hapticlink, found.fmpy, found.outputs) == ("", "", 7)
+    assert found.fastest == pytest.approx(1e5, rel=1e-6)
+    row = {"duration_s": "1.0", **{n: str(v) for n, v in dataclasses.asdict(found).items()}}
+    assert foreign._is_stiff(row)
+    few = foreign.EXPLICIT * foreign.STIFF * (found.steps - 1)
+    assert not foreign._is_stiff(row | {"fastest": str(few)})
+    assert case.settings == "k = 100000, level = -1e+09, top = 1e+09, tolerance = 1e-06"
+
+
 def test_a_difference_is_measured_and_has_its_time(tmp_path):
     """The FMU tells the master by its process, which its library has been loaded into."""
     body = "import sys; self.y = 1.0 * ('benchmarks' in sys.modules and end > 0.5)"
@@ -69,8 +85,7 @@ def test_the_page_has_what_ran_and_why_others_did_not(tmp_path, monkeypatch):
         made.add(other, "some_fmus-1.2/tests/Old.fmu")
     with zipfile.ZipFile(tmp_path / "more-3.0-py3-none-any.whl", "w") as wheel:
         wheel.write(lag, "more/Lag.fmu")
-    archives = [*tmp_path.glob("*.tar.gz"), *tmp_path.glob("*.whl")]
-    monkeypatch.setattr(foreign, "download_packages", lambda folder: archives)
+    bring(monkeypatch, tmp_path, *tmp_path.glob("*.tar.gz"), *tmp_path.glob("*.whl"))
     monkeypatch.setattr(foreign, "install_libraries", lambda folder: None)
     (tmp_path / "out").mkdir()
     told: list[str] = []
@@ -87,10 +102,47 @@ def test_the_page_has_what_ran_and_why_others_did_not(tmp_path, monkeypatch):
     assert len(rows.rows) == 3
 
 
-def test_fmus_keep_their_place_in_the_package(tmp_path: Path) -> None:
+def bring(monkeypatch: pytest.MonkeyPatch, folder: Path, *archives: Path) -> None:
+    """Packages that are there, and no repositories."""
+    monkeypatch.setattr(foreign_packages, "download_packages", lambda folder: archives)
+    (folder / "repositories.txt").write_text("# none\n")
+    monkeypatch.setattr(foreign_packages, "REPOSITORIES", folder / "repositories.txt")
+
+
+def test_fmus_keep_their_place_in_the_package(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     lag = python_fmu(tmp_path, "Lag", LAG)
     with tarfile.open(tmp_path / "some_fmus-1.2rc1.tar.gz", "w:gz") as made:
         made.add(lag, "some_fmus-1.2rc1/tests/Lag.fmu")
-    (found,) = find_fmus(tmp_path / "some_fmus-1.2rc1.tar.gz", tmp_path / "fmus")
+    bring(monkeypatch, tmp_path, tmp_path / "some_fmus-1.2rc1.tar.gz")
+    (found,) = find_fmus(tmp_path)
     assert (found.package, found.file, found.fmi) == ("some-fmus 1.2rc1", "tests/Lag.fmu", "2.0")
+    assert found.path.read_bytes() == lag.read_bytes()
+
+
+def test_fmus_of_a_repository_are_those_of_its_commit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lag, origin = python_fmu(tmp_path, "Lag", LAG), tmp_path / "origin"
+    bring(monkeypatch, tmp_path)
+    (origin / "fmus").mkdir(parents=True)
+    (origin / "fmus" / "Lag.fmu").write_bytes(lag.read_bytes())
+    (origin / "Other.fmu").write_text("in a folder that is not asked for")
+    settings = tmp_path / "gitconfig"
+    settings.write_text(
+        f'[url "{origin}"]\n\tinsteadOf = https://github.com/some/fmus\n'
+        "[uploadpack]\n\tallowFilter = true\n\tallowAnySHA1InWant = true\n"
+        "[user]\n\tname = a\n\temail = a@b\n"
+    )
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", str(settings))
+    commands = ("init -q", "add .", "commit -qm made", "rev-parse HEAD")
+    for command in commands:
+        done = subprocess.run(
+            ["git", "-C", str(origin), *command.split()], check=True, stdout=subprocess.PIPE
+        )
+    commit = done.stdout.decode().strip()
+    (tmp_path / "repositories.txt").write_text(f"some/fmus {commit} fmus\n")
+    (found,) = find_fmus(tmp_path)
+    assert (found.package, found.file) == (f"some/fmus {commit[:7]}", "fmus/Lag.fmu")
     assert found.path.read_bytes() == lag.read_bytes()

@@ -102,6 +102,19 @@ const HANDLERS = {
     if (sound?.signal) sound.feel(loudness(sound.signal, message, stage.view.dimension));
   },
   map: (message) => show({ map: { ...message, since: performance.now() } }),
+  // Of a blind trial, whose page has no controls, and nothing that says how it is set.
+  question({ text, answers, question, over }) {
+    document.body.classList.add("trial");
+    $("question").textContent = text;
+    $("answers").replaceChildren(...answers.map(([given, label]) => {
+      const button = document.createElement("button");
+      button.textContent = label;
+      button.onclick = () => run.send({ type: "answer", question, given });
+      return button;
+    }));
+    $("answers").firstChild?.focus();
+    if (over) { run.send({ type: "answer", question, given: "seen" }); run.leave(); }
+  },
   building({ said, took }) { view.building = { said, took, since: performance.now() }; },
   refused(message) {
     view.refused = message.why;

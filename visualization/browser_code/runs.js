@@ -18,7 +18,8 @@ export function connectToServer({ received, opened, lost }) {
   };
   connect();
   const send = (message) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(message)); };
-  return { send, compare: (on) => send({ type: "compare", on }) };
+  const leave = () => { socket.onclose = null; socket.close(); };
+  return { send, leave, compare: (on) => send({ type: "compare", on }) };
 }
 
 // A run in a worker of the page's own file: the same messages as with a server. A frame is asked for whenever the

@@ -56,6 +56,8 @@ FEW_KEYS = 3
 """Keys whose values alone name a row: of more, each row says those that it gives."""
 FEW = len(CURVES)
 """Number of lines that differ in colour; further ones also differ in dash pattern."""
+MOST_BARS = 60
+"""Runs without a numeric key that have a bar each; of more the distribution is drawn."""
 LOW, HIGH, LOST = "low", "high", "lost"
 """Of a row that stands for repeated runs: quartiles of the metric, and runs that did not last."""
 DPI = 130
@@ -107,6 +109,8 @@ def draw(rows: Sequence[Row], keys: Sequence[str], metric: str | None = None) ->
         _map(figure, axes, rows, numeric[0], numeric[1], metric, name)
     elif numeric:
         _lines(axes, rows, numeric[0], others, metric, name)
+    elif len(rows) > MOST_BARS:
+        _distribution(axes, rows, metric, name)
     else:
         _bars(axes, rows, keys, metric, name)
     whole = [r for r in rows if _is_whole(r, metric)] or [r for r in rows if _is_shown(r, metric)]
@@ -294,6 +298,19 @@ def _map(
     mesh = axes.pcolormesh(xs, ys, values, shading="nearest", norm="log" if wide else "linear")
     figure.colorbar(mesh, label=f"{name}{lost}")
     axes.set(xlabel=axis(x), ylabel=axis(y))
+
+
+def _distribution(axes: Any, rows: Sequence[Row], metric: str, name: str) -> None:
+    """The share of all rows, failed ones among them, whose number is at most that."""
+    values = sorted(r[metric] for r in rows if _is_shown(r, metric))
+    if not values:
+        return
+    shares = 100 * np.arange(len(values) + 1) / len(rows)
+    axes.step([*values[:1], *values], shares, where="post", color=CURVES[0])
+    if 0 < values[0] < values[-1] / 30:
+        axes.set_xscale("log")
+    of = "points" if any(LOST in r for r in rows) else "runs"
+    axes.set(xlabel=name, ylabel=f"share of the {of} with at most that (%)", ylim=(0, 102))
 
 
 def _bars(axes: Any, rows: Sequence[Row], keys: Sequence[str], metric: str, name: str) -> None:

@@ -77,7 +77,17 @@ class Compare:
     on: bool
 
 
-Message = Hand | SetControl | Time | Compare
+@dataclass(frozen=True)
+class TrialReply:
+    """An answer to the question of that number of a trial."""
+
+    __pydantic_config__ = STRICT
+    type: Literal["answer"]
+    question: int
+    given: Name
+
+
+Message = Hand | SetControl | Time | Compare | TrialReply
 
 
 @cache

@@ -159,7 +159,7 @@ class Pages:
 
     async def window(self, connection: ServerConnection) -> None:
         """Serve a window until it is closed."""
-        for kind in ("opening", "building", "scene", "controls", "state", "map"):
+        for kind in ("opening", "building", "scene", "controls", "state", "map", "question"):
             if message := self._newest.get(kind):
                 await connection.send(self._text(kind, message))
         self._windows.add(connection)

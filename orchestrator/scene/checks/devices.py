@@ -36,7 +36,7 @@ def _of_the_plane(device: Device, here: Path) -> Iterator[Problem]:
             yield (*here, "handle", key), text
     for i, loop in enumerate(device.loop):
         if loop.type == "revolute":
-            text = "a pin is of the plane: in space take a rod, which closes a loop by its length"
+            text = 'a pin is of the plane: in space take "spherical" or "rod"'
             yield (*here, "loop", i, "type"), text
 
 

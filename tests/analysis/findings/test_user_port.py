@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings import summary, work_of_wrenches
 from hapticlink.analysis.findings.user_port import UserPort, allowance, user_port
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.experiment import simulate
@@ -233,3 +233,11 @@ def test_what_is_not_recorded_is_nobodys_energy(signals: list[str], has_port: bo
         assert whole.blocks_J
         assert not port.blocks_J
         figures(results)["user_port"]
+
+
+def test_products_of_rows_have_the_bits_of_sums_along_rows() -> None:
+    """Zeros of both signs, and numbers that cancel, too."""
+    numbers = np.array([0.0, -0.0, 1.0, -1.0, 1e-17, -3.7, 1e30])
+    force, moved = np.random.default_rng(5).choice(numbers, (2, 500, 3))
+    work = work_of_wrenches._dot(force, moved)
+    assert work.tobytes() == (force * moved).sum(axis=1).tobytes()

@@ -173,5 +173,7 @@ def test_a_whole_trial_is_written(tmp_path) -> None:
 
 
 def test_nobody_feels_a_simulated_device(tmp_path) -> None:
-    with pytest.raises(hl.InputFault, match="nobody feels a simulated device: give --device PORT"):
+    with pytest.raises(
+        hl.InputFault, match="nobody feels a simulated device: give --device PORT, or --page"
+    ):
         hl.trial("closed-loop", ["graphics.rate=10"], ask=lambda *a: "q", out=tmp_path)

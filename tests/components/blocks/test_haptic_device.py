@@ -2,6 +2,7 @@
 
 import typing
 from dataclasses import replace
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -17,10 +18,23 @@ from tests.reference import twin_pantograph
 
 T = 1 / 512
 START = (-0.02, 0.01, 3.6)
-IDEAL = haptic_device(twin())
-ENCODERS = haptic_device(twin(), encoders=True)
-BESIDE = replace(twin(), observer=Observer(beside=True))
-ALONE = haptic_device(BESIDE, encoders=True)
+
+
+@cache
+def ideal():
+    return haptic_device(twin())
+
+
+@cache
+def counting():
+    """With encoders and an observer."""
+    return haptic_device(twin(), encoders=True)
+
+
+@cache
+def alone():
+    """Without its observer, which is beside it."""
+    return haptic_device(replace(twin(), observer=Observer(beside=True)), encoders=True)
 
 
 def at_start(component, **inputs):
@@ -34,7 +48,7 @@ def base_jacobian(pose):
 
 
 def test_starts_at_rest_at_x_start():
-    for component in (IDEAL, ENCODERS, ALONE):
+    for component in (ideal(), counting(), alone()):
         y = at_start(component).y
         np.testing.assert_array_equal(y["x_true"], START)
         for name in {"v", "v_true", "F_hand_observed", "c", "tau_applied"} & {*y}:
@@ -42,10 +56,10 @@ def test_starts_at_rest_at_x_start():
 
 
 def test_ideal_sensing_has_no_encoder_and_no_observer():
-    assert [v.name for v in IDEAL.states] == ["x_true", "v_true"]
-    names = {v.name for v in IDEAL.parameters}
+    assert [v.name for v in ideal().states] == ["x_true", "v_true"]
+    names = {v.name for v in ideal().parameters}
     assert names.isdisjoint({"encoder_resolution", "omega_n", "k_D"})
-    y = advance(at_start(IDEAL, F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0)), 50 * T, 512).y
+    y = advance(at_start(ideal(), F_hand=(0.3, -0.2, 0.001), F_motor=(0.1, 0.1, 0)), 50 * T, 512).y
     np.testing.assert_array_equal(y["x"], y["x_true"])
     np.testing.assert_array_equal(y["v"], y["v_true"])
     assert "F_hand_observed" not in y
@@ -53,7 +67,7 @@ def test_ideal_sensing_has_no_encoder_and_no_observer():
 
 def test_a_device_without_observer_puts_out_what_encoders_count_and_motors_have_given():
     torques = (0.01, -0.02, 0.03, 0.005)
-    device = at_start(ALONE, tau=torques)
+    device = at_start(alone(), tau=torques)
     before = device.y["tau_applied"]
     for _ in range(64):
         device.step(T)
@@ -70,7 +84,7 @@ def test_a_device_without_observer_puts_out_what_encoders_count_and_motors_have_
 
 def test_acceleration_from_rest_is_force_over_inertia():
     wrench, motor = np.array([0.3, -0.2, 0.001]), np.array([-0.1, 0.4, -0.002])
-    device = at_start(IDEAL, F_hand=wrench, F_motor=motor)
+    device = at_start(ideal(), F_hand=wrench, F_motor=motor)
     M = device.y["M"]
     device.step(1e-6)
     np.testing.assert_allclose(device.y["v"] / 1e-6, np.linalg.solve(M, wrench + motor), rtol=1e-8)
@@ -80,7 +94,7 @@ def test_held_torques_against_scipy():
     """One long step: the torques of t_k stay, so the wrench turns with J_q; substeps of Heun's
     method converge to DOP853 at second order."""
     wrench, motor, h = np.array([0.1, 0.2, 0.001]), np.array([-0.4, 0.3, 0.004]), 0.04
-    reference = at_start(IDEAL)
+    reference = at_start(ideal())
     x0 = np.r_[reference.x[:3], 0.2, -0.1, 3.0]
     J0 = base_jacobian(x0[:3])
     tau = J0 @ np.linalg.solve(J0.T @ J0, motor)
@@ -107,7 +121,7 @@ def test_held_torques_against_scipy():
 
 def test_energy_balance_under_a_force():
     """Work of hand and motors equals the kinetic energy gained, to the integrator's error."""
-    device = at_start(IDEAL, F_hand=(0.3, -0.1, 0.002))
+    device = at_start(ideal(), F_hand=(0.3, -0.1, 0.002))
     work = 0.0
     for _ in range(100):
         before = device.y["x_true"]
@@ -119,7 +133,7 @@ def test_energy_balance_under_a_force():
 
 def test_measured_pose_is_within_a_count():
     """One count is 0.15 to 0.21 mm and 4 to 5 mrad: half a count on each encoder at most."""
-    device = at_start(ENCODERS, F_hand=(0.1, -0.05, 0.0004))
+    device = at_start(counting(), F_hand=(0.1, -0.05, 0.0004))
     seen, errors = set(), []
     for _ in range(256):
         device.step(T)
@@ -134,7 +148,7 @@ def test_measured_pose_is_within_a_count():
 
 
 def test_theta_is_continuous_over_many_turns():
-    device = at_start(ENCODERS).put(v_true=(0, 0, 12.0))
+    device = at_start(counting()).put(v_true=(0, 0, 12.0))
     for _ in range(600):
         x, v = device.state["x_true"] - START, device.state["v_true"]
         device.set(F_motor=(*(-40 * x[:2] - 4 * v[:2]), 0))
@@ -178,7 +192,7 @@ def test_observer_follows_a_moving_device(law):
 
 def test_workspace_margin_and_stop():
     """Pushed out at full reach the margin goes negative and the stop holds the handle."""
-    device = at_start(IDEAL, F_hand=(0, 4.0, 0), F_motor=(0, 0, 0))
+    device = at_start(ideal(), F_hand=(0, 4.0, 0), F_motor=(0, 0, 0))
     least = np.inf
     for _ in range(1024):
         device.set(F_hand=(0, 4.0 - 5 * device.y["v"][1], -0.01 * device.y["v"][2]))

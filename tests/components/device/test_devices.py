@@ -35,6 +35,8 @@ KINDS = {
     "stage": JointCoordinates,
     "paddle": JointCoordinates,
     "ideal-3": JointCoordinates,
+    "falcon": JointCoordinates,
+    "phantom-premium": JointCoordinates,
 }
 RANGED = {"joint.a_left.range": [0.5, 4.0]}
 
@@ -275,3 +277,43 @@ def test_origins_of_numbers_are_told_by_their_words():
         assert all(vars(device(name).origin).values())
     with pytest.raises(InputFault, match="origin: masses = 'guessed' begins with none of printed"):
         device("2diy", {"origin.masses": "guessed"})
+
+
+def test_a_serial_arm_counts_no_turn_of_its_elbow_that_it_has_not_made(tmp_path):
+    """The elbow of two links between pivot and handle is their angle, by the law of cosines: the
+    forearm's side runs from its handle back to the elbow, along -x."""
+    links = 0.13, 0.12
+    (tmp_path / "arm.toml").write_text(f"""
+handle = {{ body = "forearm", at = [{links[1]}, 0.0], angle = "free" }}
+motor = {{ torque_limit = 0.1, ratio = 8.0 }}
+encoder = {{ resolution = 1e-4 }}
+start = {{ shoulder = 0.2, elbow = 1.4 }}
+body = [
+    {{ name = "upper", mass = 0.12, inertia = 1.6e-4 }},
+    {{ name = "forearm", mass = 0.07, inertia = 9e-5 }},
+]
+[[joint]]
+name = "shoulder"
+child = "upper"
+motor = true
+encoder = true
+
+[[joint]]
+name = "elbow"
+parent = "upper"
+child = "forearm"
+at_parent = [{links[0]}, 0.0]
+motor = true
+encoder = true
+range = [0.3, 2.6]
+""")
+    arm = device(str(tmp_path / "arm.toml"))
+    pose = [0.14, 0.11, 0.0]
+    across = (np.hypot(*pose[:2]) ** 2 - links[0] ** 2 - links[1] ** 2) / (2 * links[0] * links[1])
+    assert At(device_model(arm))(pose, [0.0, 0.0])[-3][1, 0] == pytest.approx(np.arccos(across))
+    margin_there = margin(arm, np.array([pose]))[0]
+    plant = Running(
+        haptic_device(arm), parameters={"x_start": pose}
+    )  # with parameters, not numbers
+    assert plant.y["workspace_margin"] == pytest.approx(margin_there, abs=1e-12)
+    assert margin_there > 0

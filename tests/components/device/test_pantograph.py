@@ -1,5 +1,6 @@
 """Twin pantograph: kinematics, dynamics, sensing and actuation as properties over the workspace."""
 
+from functools import cache
 from types import SimpleNamespace
 
 import casadi as ca
@@ -20,28 +21,35 @@ ROUGH = {"motor_damping": 2e-3, "motor_friction": 6e-3}
 POSE, V, WRENCH, ANGLES = (ca.SX.sym(s, n) for s, n in (("x", 3), ("v", 3), ("F", 3), ("a", 4)))
 
 
-def function(arguments, *expressions):
-    f = ca.Function("f", list(arguments), list(expressions))
+def function(arguments, expressions):
+    """Of `expressions`, which are made when it is called first: not where tests are collected."""
+
+    @cache
+    def made():
+        return ca.Function("f", list(arguments), [*expressions()])
 
     def call(*values):
-        out = [np.array(v) for v in f.call([ca.DM(v) for v in values])]
+        out = [np.array(v) for v in made().call([ca.DM(v) for v in values])]
         return out[0] if len(out) == 1 else out
 
     return call
 
 
 DISTAL = [f"{arm}_distal" for arm in ("a_left", "a_right", "b_left", "b_right")]
-FRAMES = MODEL.frames(POSE, P)
-angles = function([POSE], MODEL.angles(POSE, P))
-distal = function([POSE], ca.vertcat(*(FRAMES[body].angle for body in DISTAL)))
-jacobian = function([POSE], MODEL.jacobian(POSE, P))
-dynamics = function([POSE, V], *MODEL.dynamics(POSE, V, P))
-margins = function([POSE], MODEL.margins(POSE, P))
-stop = function([POSE, V], MODEL.stop_force(POSE, V, P))
-estimate = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P))
-estimate_4 = function([ANGLES, POSE], MODEL.place_from_angles(ANGLES, POSE, P, iterations=4))
-torques = function([WRENCH, POSE], MODEL.motor_torques(WRENCH, POSE, P))
-friction = function([ANGLES], MODEL.friction_torques(ANGLES, ROUGH))
+angles = function([POSE], lambda: [MODEL.angles(POSE, P)])
+distal = function(
+    [POSE], lambda: [ca.vertcat(*(MODEL.frames(POSE, P)[body].angle for body in DISTAL))]
+)
+jacobian = function([POSE], lambda: [MODEL.jacobian(POSE, P)])
+dynamics = function([POSE, V], lambda: MODEL.dynamics(POSE, V, P))
+margins = function([POSE], lambda: [MODEL.margins(POSE, P)])
+stop = function([POSE, V], lambda: [MODEL.stop_force(POSE, V, P)])
+estimate = function([ANGLES, POSE], lambda: [MODEL.place_from_angles(ANGLES, POSE, P)])
+estimate_4 = function(
+    [ANGLES, POSE], lambda: [MODEL.place_from_angles(ANGLES, POSE, P, iterations=4)]
+)
+torques = function([WRENCH, POSE], lambda: [MODEL.motor_torques(WRENCH, POSE, P)])
+friction = function([ANGLES], lambda: [MODEL.friction_torques(ANGLES, ROUGH)])
 
 
 def reach(pose):
@@ -222,7 +230,7 @@ def test_stops_push_back_and_only_beyond_the_margin():
 
 
 def test_velocity_term_is_the_christoffel_matrix_times_the_velocity():
-    term = function([POSE, V], *MODEL.motion(POSE, V, P))
+    term = function([POSE, V], lambda: MODEL.motion(POSE, V, P))
     for pose, v in (
         ((0.01, -0.02, 0.4), (0.3, -0.2, 4.0)),
         ((-0.04, 0.03, 3.5), (-0.1, 0.5, -6.0)),
@@ -256,12 +264,14 @@ def test_the_twin_of_a_file_is_the_twin_in_closed_form(pose, v, wrench):
 
 
 def _all(model, p, stop, angles):
-    outputs = (
-        *model.dynamics(POSE, V, p), model.motion(POSE, V, p)[1], model.jacobian(POSE, p),
-        angles(POSE, p), model.margins(POSE, p), stop(POSE, V, p),
-        model.motor_torques(WRENCH, POSE, p),
+    return function(
+        [POSE, V, WRENCH],
+        lambda: (
+            *model.dynamics(POSE, V, p), model.motion(POSE, V, p)[1], model.jacobian(POSE, p),
+            angles(POSE, p), model.margins(POSE, p), stop(POSE, V, p),
+            model.motor_torques(WRENCH, POSE, p),
+        ),
     )  # fmt: skip
-    return function([POSE, V, WRENCH], *outputs)
 
 
 FROM_FILE = _all(MODEL, P, MODEL.stop_force, MODEL.angles)

@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator
 
+from hapticlink.api.runs import with_board
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.orchestrator.base import signal_names
 from hapticlink.orchestrator.base.signal_names import block_of_user, signal_of_user, user_of_block
+from hapticlink.orchestrator.scene.overrides import write_options
 from tests.orchestrator.systems import system_of
 from tests.visualization.live_page.test_controls import POINTS
 
@@ -27,6 +29,7 @@ SCENES = {
     "closed-loop": ("device.observer.beside=true",),
     "obstacles": ("mechanism.directions=true", "controller.passivity=true"),
     "pendulum": ("mechanism.integrator=passive-midpoint",),
+    "closed-loop-2diy": write_options(with_board("/dev/ttyACM0")),
 }
 
 

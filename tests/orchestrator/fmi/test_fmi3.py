@@ -185,6 +185,14 @@ def test_a_text_is_held_between_rates(tmp_path):
     np.testing.assert_array_equal(found.haptics["takes.length"], [0, 2, 2, 3, 3, 4, 4, 5, 5, 6, 6])
 
 
+def test_a_text_is_set_at_a_given_time(tmp_path):
+    counts = "values['length'] = len(values['heard'])"
+    slave(tmp_path, "Takes", ("input", {"heard": ""}), ("output", {"length": 0}), body=counts)
+    at = '[[at]]\ntime = 0.05\nset = { "takes.heard" = "äöü" }\n'
+    found = ran(tmp_path, fmu_table("takes", "Takes") + at, "haptics.rate=100", "duration=0.1")
+    np.testing.assert_array_equal(found.haptics["takes.length"], [0] * 6 + [3] * 5)
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [

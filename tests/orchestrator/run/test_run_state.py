@@ -319,6 +319,24 @@ def test_every_shipped_scene_goes_on_to_the_same_bytes(tmp_path, name):
         assert_goes_on(tmp_path / state, name, {"duration": 0.8}, state)
 
 
+@pytest.mark.parametrize("name", list_shipped())
+def test_every_shipped_scene_branches_to_the_bytes_of_a_run_of_its_own(tmp_path, name):
+    """A branch that is disturbed behind the state is the run that is disturbed then."""
+    folders = [tmp_path / each for each in ("first", "whole", "branch")]
+    first = hl.run(name, {"duration": 0.8}, out=folders[0], figures=False, save=[0.3])
+    fed = {text.partition(" -> ")[2] for text in first.run["connections"]}
+    port = next((p for p in ("controller.x_D", "hand.x", "wall.x") if p in fed), None)
+    push = {"set": {"virtual_mechanism.F_drift": [0.05, 0.0, 0.0]}}
+    own = hl.scene(name).source.tables.get("at", [])
+    disturbed = {"at": [*own, {"time": 0.5, **({"noise": {port: 1e-5}} if port else push)}]}
+    whole = hl.run(name, {"duration": 0.8, **disturbed}, out=folders[1], figures=False)
+    branch = hl.run(folders[0] / "at-0.3.state", disturbed, out=folders[2], figures=False)
+    for table in (f"{clock}.csv" for clock in whole.run["rates"]):
+        lines = joined(folders[0], folders[2], table, branch.run["resumed"]["time"])
+        assert lines == (folders[1] / table).read_text().splitlines()
+    assert not np.array_equal(first["virtual_mechanism.x"], whole["virtual_mechanism.x"])
+
+
 KILLED = 25
 
 

@@ -5,36 +5,9 @@ import pytest
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.scene import read_and_check
+from tests.spatial_linkages import BALL_AND_SLIDER
 
-SCENE = """
-title = "A bar on a ball, and a slider"
-duration = 0.1
-
-[linkage]
-operational_point = { body = "bar", at = [0.0, 0.0, 0.3] }
-gravity = [0.0, 0.0, -9.81]
-
-[[linkage.body]]
-name = "bar"
-mass = 1.0
-inertia = [0.02, 0.02, 0.001]
-
-[[linkage.body]]
-name = "block"
-mass = 1.0
-inertia = 0.01
-
-[[linkage.joint]]
-name = "ball"
-type = "spherical"
-child = "bar"
-
-[[linkage.joint]]
-name = "slide"
-type = "prismatic"
-child = "block"
-axis = [1.0, 0.0, 0.0]
-"""
+SCENE = f'title = "A bar on a ball, and a slider"\nduration = 0.1\n{BALL_AND_SLIDER}'
 ROD = (
     "linkage.loop.+={ type = 'rod', bodies = ['bar', 'block'], "
     "at = [[0, 0, 0.1], [0.3, 0, 0]], length = 0.31622776601683794%s }"
@@ -66,7 +39,10 @@ REFUSED = [
     ("hand={ type = 'arm', target = [[0, 0, 0, 0]] }", "hand.mass: the default is of the plane"),
     ("device={}", "device: is of the plane, and a spherical joint put the linkage in space: take"),
     ("device={ extends = 'ideal-3', handle = { angle = 'free' } }", "of three forces: take it out"),
-    (DEVICE % "loop = [{ bodies = ['a', 'ground'], at = [[0, 0], [0, 0]] }]", "take a rod, which"),
+    (
+        DEVICE % "loop = [{ bodies = ['a', 'ground'], at = [[0, 0], [0, 0]] }]",
+        'in space take "spherical"',
+    ),
     (DEVICE % "base = [0, 0, 1]", "device.joint[0] (j).axis: [0.0, 0.0, 0.0] has no length"),
     ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
     ("local_model=true", "local_model: is of the plane: leave it out"),

@@ -14,7 +14,14 @@ import hapticlink as hl
 
 STEPS = 128
 OPTIONS = {"coupling": "jacobi", "duration": STEPS / 512}
-SCENES = ("closed-loop-ideal", "closed-loop-direct", "two-users", "two-hands", "enclosure")
+SCENES = (
+    "closed-loop-ideal",
+    "closed-loop-direct",
+    "two-users",
+    "two-hands",
+    "enclosure",
+    "closed-loop-bricard",
+)
 SAMPLED = ("controller", "hand")
 AT_ONCE = ("qdd", "lambda", "F_env")
 """Outputs that depend on inputs at once: hapticlink reads them before it sets these, Ecos after."""

@@ -13,6 +13,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
+from hapticlink.orchestrator.run.compiled import build
 from tests.little_fmus import python_fmu, slave, with_units
 from tests.orchestrator.c_fmus import c_fmu3, clock_fmu3
 from tests.orchestrator.foreign_scenes import PAIR, fmu_table, scene, wire_table
@@ -137,6 +138,10 @@ def test_what_cannot_be_read_is_refused(tmp_path, old, new, message):
         open_scene.load(foreign(tmp_path, old, new))
 
 
+@pytest.mark.skipif(
+    not (build.HERE / build.name()).exists(),
+    reason="the event loop has changed since the install, and would be compiled into the cache",
+)
 def test_with_the_cache_off_no_folder_stays(tmp_path):
     path = foreign(tmp_path)
     (tmp_path / "temporary").mkdir()

@@ -153,6 +153,22 @@ def test_runs_that_differ_in_many_keys_are_named_by_those_they_give() -> None:
     assert " ".join(figure.axes[0].get_title().split()).endswith("1 mm at mass of link0 = 2 kg")
 
 
+def test_of_many_draws_the_share_of_runs_is_drawn_with_failed_ones_among_them() -> None:
+    values = np.random.default_rng(3).permutation(np.arange(1.0, 181.0))
+    rows = [{"w": f"[{v}]", "tracking_max_mm": v, "end": "duration"} for v in values]
+    rows += [{"w": f"[{n}]", "end": "fault"} for n in range(20)]
+    figure = sweep_figure.draw(rows, ["w"], None)
+    assert figure
+    (curve,) = figure.axes[0].lines
+    x, share = curve.get_data()
+    assert [x[0], share[0], x[-1], share[-1]] == [1.0, 0.0, 180.0, 90.0]
+    np.testing.assert_allclose(share[1:], [100 * (values <= at).sum() / 200 for at in x[1:]])
+    assert curve.get_drawstyle() == "steps-post"
+    title = " ".join(figure.axes[0].get_title().split())
+    assert title.endswith("; 20 of 200 runs ended early or failed")
+    assert sweep_figure.draw([r for r in rows if r["end"] == "fault"], ["w"], None) is None
+
+
 def test_the_title_of_a_sweep_has_quantity_unit_and_failures() -> None:
     best = {"graphics.rate": "60", "hold": "foh"}
     told = sweep_figure.finding(best, 0.4361, "RMS tracking error (mm)", list(best), 3, 12)

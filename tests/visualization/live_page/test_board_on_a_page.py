@@ -50,4 +50,8 @@ def test_it_shows_the_measured_handle_and_the_mouse_pulls_at_nothing(port, tmp_p
     assert all(f["handle"] == f["measured"] for f in frames)
     assert all("F_hand" not in f for f in frames)
     assert not [m for m in link.sent if m["type"] == "refused"]
+    (controls, *_) = (m["controls"] for m in link.sent if m["type"] == "controls")
+    keys = {control["key"] for control in controls}
+    assert "graphics.rate" in keys
+    assert "speed" not in keys  # the time of a board is the clock's
     assert not any(port.torques[-1])
