@@ -34,8 +34,8 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16519,
     "programs": 1027,
-    "analysis": 9106,
-    "visualization": 3855,
+    "analysis": 9107,
+    "visualization": 3854,
     "api": 645,
     "commands": 1638,
 }

@@ -134,9 +134,8 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
 def _cut_joint_forces(linkage: Linkage) -> Part:
     """The force (N) on the first body in each joint that is cut, (d, k): what the multipliers of
     its rows push the joint's point by, dh/dp' lambda. Moments have no arrow."""
-    lifted = tuple(
-        replace(loop, at=tuple(full(linkage, at) for at in loop.at)) for loop in linkage.loop
-    )
+    ends: list[Any] = [tuple(full(linkage, at) for at in loop.at) for loop in linkage.loop]
+    lifted = (*(replace(o, at=at) for o, at in zip(linkage.loop, ends, strict=True)),)
     linkage = replace(linkage, loop=lifted, gear=())  # dh/dp in all directions, of the cut joints
     p = Signals("p", body_parameters(linkage))
     model = LinkageModel.symbolic(linkage, p)
