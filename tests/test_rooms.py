@@ -34,8 +34,8 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16521,
     "programs": 1027,
-    "analysis": 9103,
-    "visualization": 3856,
+    "analysis": 9104,
+    "visualization": 3854,
     "api": 645,
     "commands": 1638,
 }

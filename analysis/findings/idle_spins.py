@@ -24,6 +24,7 @@ from hapticlink.components.dynamics.operational_space import OperationalSpace
 from hapticlink.components.dynamics.variables import parameters
 from hapticlink.components.linkage.model import LinkageModel
 from hapticlink.components.specs.linkage import Directions, Linkage
+from hapticlink.components.specs.quantities import Place
 from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
@@ -41,7 +42,8 @@ def spinning(linkage: Linkage) -> list[str]:
 
 
 def _hangs_on_two_balls(linkage: Linkage, body: str) -> bool:
-    held = [(joint.type, joint.at_child) for joint in linkage.joint if joint.child == body]
+    held: list[tuple[str, Place | None]] = []
+    held += [(joint.type, joint.at_child) for joint in linkage.joint if joint.child == body]
     held += [(joint.type, joint.at_parent) for joint in linkage.joint if joint.parent == body]
     for loop in linkage.loop:
         ends = zip(loop.bodies, loop.at, strict=True)
@@ -84,8 +86,8 @@ def _mobilities(linkage: Linkage, body: str, q: Matrix) -> tuple[Matrix, Matrix]
     model = LinkageModel.symbolic(linkage, p)
     frames = (frame for name, frame in model.frames.items() if name not in ("ground", body))
     still = ca.vertcat(model.h, *(ca.vertcat(f.origin, ca.vec(f.rotation)) for f in frames))
-    others = ca.jacobian(still, model.q)
-    wanted = [OperationalSpace(model).Lambda_inv, others, model.J_h, model.D]
+    moved = ca.jacobian(still, model.q)
+    wanted = [OperationalSpace(model).Lambda_inv, moved, model.J_h, model.D]
     found = ca.Function("mobilities", [model.q, p.vector], wanted)(q, p.starts)
     mobility, others, J, D = (np.array(each) for each in found)
     _, sizes, ways = np.linalg.svd(others)

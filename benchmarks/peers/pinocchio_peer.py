@@ -141,7 +141,7 @@ class Terms:
             return pin.getFrameClassicalAcceleration(self.model, self.data, frame, WORLD).vector
 
         def place(frame: int) -> np.ndarray:
-            return self.data.oMf[frame].translation[:d]
+            return self.data.oMf[frame].translation[:d].copy()  # else it changes with the data
 
         def stack(parts: list, empty: tuple[int, ...]) -> np.ndarray:
             return np.concatenate(parts) if parts else np.zeros(empty)

@@ -304,8 +304,8 @@ def _rail(
     linkage: Linkage, ends: tuple[Place, Place], axis: float | Point | None, beyond: float
 ) -> Mark:
     """axis: in the frame of the second end."""
-    past = full(linkage, ends[1].point) + _direction(linkage, axis, beyond)
-    at = (*ends, ends[1]._replace(point=(*past.tolist(),)))
+    past = np.array(full(linkage, ends[1].point)) + _direction(linkage, axis, beyond)
+    at = (*ends, ends[1]._replace(point=past.tolist()))
     return Mark("rail", "rail", at, GREY, None, 1.0, (6.4, 1.6, 1.0, 1.6))
 
 
@@ -315,10 +315,9 @@ def _axes(linkage: Linkage, joint: Joint, half: float) -> Iterator[Mark]:
     frames = ((joint.parent, joint.at_parent, joint.axis),
               (joint.child, joint.at_child, joint.second_axis))  # fmt: skip
     for body, at, axis in frames[: joint.kind.axes]:
-        along = _direction(linkage, axis, half)
-        ends = (full(linkage, at) + side * along for side in (-1, 1))
-        at = (*(_on(body, (*end.tolist(),)) for end in ends),)
-        yield Mark("rail", "line", at, GREY, width=1.5, label="axis of a joint")
+        along, middle = _direction(linkage, axis, half), np.array(full(linkage, at))
+        ends = (*(_on(body, (middle + side * along).tolist()) for side in (-1, 1)),)
+        yield Mark("rail", "line", ends, GREY, width=1.5, label="axis of a joint")
 
 
 def _springs(linkage: Linkage) -> Iterator[Mark]:
@@ -339,9 +338,9 @@ def _joints(linkage: Linkage) -> Iterator[Mark]:
             yield Mark("joint", joint.kind.mark, (at,), fill="#ffffff")
     for i, loop in enumerate(linkage.loop):
         label = "" if i else "joint that closes a loop"
-        ends = [_on(body, at) for body, at in zip(loop.bodies, loop.at, strict=True)]
-        for end in ends if "distance" in loop.kind.holds else ends[:1]:
-            yield Mark("joint", "pin", (end,), fill=INK, label=label)
+        pins = [_on(body, at) for body, at in zip(loop.bodies, loop.at, strict=True)]
+        for pin in pins if "distance" in loop.kind.holds else pins[:1]:
+            yield Mark("joint", "pin", (pin,), fill=INK, label=label)
 
 
 def _points(linkage: Linkage) -> Iterator[Mark]:

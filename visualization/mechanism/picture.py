@@ -134,9 +134,8 @@ def _without_raw(values: Mapping[str, Any]) -> dict[str, Any]:
 def _cut_joint_forces(linkage: Linkage) -> Part:
     """The force (N) on the first body in each joint that is cut, (d, k): what the multipliers of
     its rows push the joint's point by, dh/dp' lambda. Moments have no arrow."""
-    lifted = tuple(
-        replace(loop, at=tuple(full(linkage, at) for at in loop.at)) for loop in linkage.loop
-    )
+    ends: list[Any] = [tuple(full(linkage, at) for at in loop.at) for loop in linkage.loop]
+    lifted = (*(replace(o, at=at) for o, at in zip(linkage.loop, ends, strict=True)),)
     linkage = replace(linkage, loop=lifted, gear=())  # dh/dp in all directions, of the cut joints
     p = Signals("p", body_parameters(linkage))
     model = LinkageModel.symbolic(linkage, p)
@@ -179,7 +178,7 @@ def directions_in_space() -> ca.Function:
     rest, basis = ca.reshape(p, 3, 3), []
     for _ in range(3):
         longest = ca.mmax(ca.diag(rest))
-        column = ca.SX.zeros(3)
+        column = ca.SX(3, 1)
         for k in reversed(range(3)):  # the first of several that are as long
             column = ca.if_else(rest[k, k] >= longest, rest[:, k], column)
         is_one = longest > LEAST_SHARE

@@ -44,6 +44,21 @@ def test_the_energy_at_the_users_port_is_that_of_the_results() -> None:
     assert port == pytest.approx(made.run["user_port"]["generated"], rel=1e-9)
 
 
+def test_a_page_that_opens_late_counts_the_energy_at_the_port_from_there() -> None:
+    """The hand has taken 2.5 J before, of 3 J that were stored, and puts in 0.1 J then."""
+    frames = [{"t": 4.0, "stored": 0.5, "states": [], "booked": [[-2.5, -2.5]]},
+              {"t": 4.1, "stored": 0.7, "states": [], "booked": [[-2.4, -2.4]]}]  # fmt: skip
+    found = javascript(
+        "energies.js",
+        """const power = [{ name: "hand", hand: true, counts: true }];
+        const energies = new Energies({ power, port: "port", noticeable: 1e-3 });
+        for (const frame of given) energies.add(frame);
+        answer = given.map((frame) => frame.energy.port);""",
+        frames,
+    )
+    assert found == pytest.approx([0.0, 0.1])
+
+
 def test_the_light_is_the_worst_of_a_second() -> None:
     """A hold generates 0 and 0.5 mJ by turns, of 1 mJ that are noticeable: amber from the first
     time until a second after the last one."""

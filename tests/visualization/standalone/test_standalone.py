@@ -24,6 +24,7 @@ from tests.visualization.browser_code.chromium import (
 )
 from tests.visualization.browser_code.javascript import NODE, javascript
 from tests.visualization.live_page.test_controls import POINTS
+from tests.visualization.live_page.test_page_in_space import SERVED_TEXT
 
 BYPASS_CSP = False
 Window = Callable[..., Page]
@@ -111,6 +112,28 @@ def test_the_hand_takes_another_point_as_at_a_given_time(window: Window, tmp_pat
     page.until("view.frame?.t > 0.2")
     chosen = "document.querySelector('[data-control=\"linkage.operational_point\"]').value"
     assert page.get(chosen) == "other"
+
+
+def test_a_linkage_in_space_is_pulled_and_turned_in_its_file(
+    window: Window, tmp_path: Path
+) -> None:
+    """As behind a server: to a place of the view's plane, and turned by a drag beside it."""
+    scene, file = tmp_path / "space.toml", tmp_path / "space.html"
+    scene.write_text(SERVED_TEXT)
+    assert status("view", scene, "--standalone", file) == 0
+    assert file.stat().st_size < 300_000
+    page = window(f"file://{file}")
+    start, rows = (np.array(page.get(f"view.{of}")) for of in ("frame.x", "stage.view.rows"))
+    page.pull(0.03, 0.02)
+    wanted = start + 0.03 * rows[0] + 0.02 * rows[1]
+    page.until(f"view.frame.x.every((v, i) => Math.abs(v - {wanted.tolist()}[i]) < 2e-3)")
+    page.page.mouse.up()
+    box = page.page.locator("#scene").bounding_box()
+    page.page.mouse.move(box["x"] + 30, box["y"] + 30)
+    page.page.mouse.down()
+    page.page.mouse.move(box["x"] + 80, box["y"] + 30, steps=5)
+    page.page.mouse.up()
+    page.until("Math.abs(view.stage.view.turned + 1.1) < 1e-9")
 
 
 def test_no_request_leaves_the_page(file: Path, browser: Any, window: Window) -> None:
