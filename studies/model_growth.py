@@ -10,8 +10,8 @@ Next to rest `reaction` is `half-lead`, which is what the map has. So each cell 
 too: what is left of the handle's motion (um, from end to end in the last quarter of the run,
 infinite where the run diverges), with either of both.
 
-And the margin: the factor on the stiffnesses up to which the map is stable, with the growth rates
-of runs to both sides of it, BESIDE.
+And the margin: the factor on the stiffnesses up to which the map is stable, or drifts at most, with
+the growth rates of map and run to both sides of it, BESIDE.
 
 The rate of a run is that of its slowest decay, or of its growth. Windows of it would mix modes that
 decay nearly alike. So its snapshots y_k, the handle's velocities of a whole period P of the map,
@@ -27,7 +27,7 @@ import csv
 import math
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -46,8 +46,9 @@ from studies.mismatch.cases import LINKAGES, Case
 OFF, FAR = 1e-9, 1e-3
 """From the start to the hand's target, in x and y (m)."""
 SECONDS = 8.0
-LARGE, SMALL = 1e-4, 1e-11
-"""Velocities (m/s) above which a motion is no longer small, and below which it is rounding."""
+LARGE, SMALL = 1e-6, 1e-11
+"""Velocities (m/s) above which a motion is no longer far below 10 um, so that `reaction` finds a
+stiffness, and below which it is rounding."""
 SAME = 0.01
 """Difference of growth rates, relative to the larger one or to 1 1/s, that is none."""
 RANK = 1e-4
@@ -169,11 +170,21 @@ def left_of(cell: Cell, hold: str) -> float:
     return 1e6 * float(np.ptp(handle[len(handle) * 3 // 4 :], axis=0).max())
 
 
+LEFT = {"left_of_1_mm_um": "reaction", "left_with_half_lead_um": "half-lead"}
+
+
+def both_rates(cell: Cell) -> tuple[float, float]:
+    """The growth rates (1/s) by the map and of a run."""
+    told, P = of_map(cell)
+    return told, of_run(cell, P)
+
+
 def margin_of(cell: Cell) -> float:
-    """The factor on the stiffnesses up to which the map is stable; 0 where it is with none."""
+    """The factor on the stiffnesses up to which `stability` calls a stable cell stable."""
     found = hl.equilibrium_stability(cell.scene, cell.options)
     assert isinstance(found, hl.Stability)
-    return found.margin.stiffness or 0.0
+    assert found.margin.stiffness
+    return found.margin.stiffness
 
 
 def agree(told: float, found: float) -> bool:
@@ -181,28 +192,35 @@ def agree(told: float, found: float) -> bool:
     return abs(told - found) <= SAME * max(1.0, abs(told), abs(found))
 
 
+HEADER = (
+    "linkage", "gains", "hz", "hand_n_per_m", "computing_time_frames", "map", "run", "margin",
+    "map_below_margin", "run_below_margin", "map_above_margin", "run_above_margin", "same",
+    "left_of_1_mm_um", "left_with_half_lead_um",
+)  # fmt: skip
+
+
 def main(folder: Path) -> None:
     """Writes the table."""
-    header = ("linkage", "gains", "hz", "hand_n_per_m", "computing_time_frames", "map", "run")
-    header += ("same", "margin", "run_below_margin", "run_above_margin")
-    header += ("left_of_1_mm_um", "left_with_half_lead_um")
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "growth.csv").open("w", newline="", encoding="utf-8") as file:
-        table = csv.writer(file, lineterminator="\n")
-        table.writerow(header)
+        table = csv.DictWriter(file, HEADER, lineterminator="\n")
+        table.writeheader()
         for cell in cells():
-            told, P = of_map(cell)
-            found = of_run(cell, P)
-            margin = margin_of(cell) if told < 0.0 else 0.0
-            beside = [of_run(replace(cell, stiffer=f * margin), P) for f in BESIDE if margin]
-            far = replace(cell, off=FAR)
-            left = [left_of(far, hold) for hold in ("reaction", "half-lead") if not cell.late]
-            row = [cell.linkage, cell.gains, cell.rate, f"{cell.hand:g}", f"{cell.late:g}"]
-            row += [f"{told:.4g}", f"{found:.4g}", agree(told, found), f"{margin:.3g}"]
-            row += [f"{rate:.3g}" for rate in beside] or ["", ""]
-            row += [f"{um:.2g}" for um in left] or ["", ""]
+            rates = [both_rates(cell)]
+            row = dict(zip(HEADER[:5], astuple(cell), strict=False))
+            if not cell.late:
+                if rates[0][0] < 0.0:
+                    row["margin"] = margin = margin_of(cell)
+                    rates += [both_rates(replace(cell, stiffer=margin * f)) for f in BESIDE]
+                far = replace(cell, off=FAR)
+                row |= {key: left_of(far, hold) for key, hold in LEFT.items()}
+            found = [f"{rate:.4g}" for both in rates for rate in both]
+            row |= zip((*HEADER[5:7], *HEADER[8:12]), found, strict=False)
+            row["same"] = all(agree(*both) for both in rates)
+            row = {k: f"{v:.3g}" if isinstance(v, float) else v for k, v in row.items()}
             table.writerow(row)
-            print(*row, flush=True)
+            print(*row.values(), flush=True)
+            file.flush()
 
 
 if __name__ == "__main__":

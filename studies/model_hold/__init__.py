@@ -54,6 +54,11 @@ OTHERWISE = {
 }
 """What the grid leaves out, tried at OTHER_RATE on the first draw of each linkage and hand."""
 OTHER_RATE = "20"
+ACCOUNTS = {
+    "`passive` F_drift": ("holds.virtual_mechanism.F_drift=passive",),
+    "`passive` F_hand": ("holds.virtual_mechanism.F_hand=passive",),
+}
+"""Forces on the mechanism with the account of another hold, tried in all cells of `model`."""
 COMPARED = ("foh", "passive", "model")
 Cell = tuple[str, str, str]
 """Case, rate and gains."""
@@ -71,6 +76,13 @@ def others() -> Iterator[Job]:
         for gains, method in product(GAINS, COMPARED):
             if method == "model" or "computing" not in options[0]:
                 yield _run(case, method, gains, OTHER_RATE, name, options)
+
+
+def accounted() -> Iterator[Job]:
+    """The runs of ACCOUNTS."""
+    for case, gains, rate in product(cases(), GAINS, RATES):
+        for name, options in ACCOUNTS.items():
+            yield _run(case, "model", gains, rate, name, options)
 
 
 def runs() -> Iterator[Job]:
@@ -145,7 +157,9 @@ def _quartiles(values: Sequence[float]) -> str:
     )
 
 
-def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
+def page(
+    found: Found, elsewhere: Mapping[str, Found], accounts: Mapping[str, Found]
+) -> Iterator[str]:
     """The lines of README.md."""
     yield "# The hold that knows the model, mechanism at the graphics rate"
     yield f"`python -m studies.model_hold results/model`: {len(cases())} draws from seed {SEED} on"
@@ -176,6 +190,16 @@ def page(found: Found, elsewhere: Mapping[str, Found]) -> Iterator[str]:
     rows = (_elsewhere(name, of, draws) for name, of in settings.items())
     yield _table(("", *COMPARED), rows)
     kept = found.kept
+    yield "## With an energy account"
+    yield (
+        "With the passivity observer and controller of the hold `passive` in the place of `mid` "
+        f"(F_drift) or `reaction` (F_hand), of the {len(kept)} cells in which the oracle is within "
+        "the limits; errors relative to those of `model` where both are:"
+    )
+    yield _table(
+        ("", "within", "gained", "lost", "relative error: least, quartiles, largest"),
+        (_account(name, of, found, kept) for name, of in accounts.items()),
+    )
     yield "## Within the limits"
     yield _table(
         ("gains, Hz", "oracle", *METHODS),
@@ -225,6 +249,15 @@ def _elsewhere(name: str, found: Found, draws: Iterable[str]) -> tuple[str, ...]
             f"{short(float(np.median(known)))} ({len(known)} of {len(every)})" if known else ""
         )
     return tuple(row)
+
+
+def _account(name: str, of: Found, found: Found, kept: Iterable[Cell]) -> tuple[str, ...]:
+    """The row of an account: which cells it gains and loses, and what it costs in the others."""
+    pairs = [(of.error[cell]["model"], found.error[cell]["model"]) for cell in kept]
+    both = [a / b for a, b in pairs if np.isfinite((a, b)).all()]
+    within, without = (sum(np.isfinite(each)) for each in zip(*pairs, strict=True))
+    counts = within, within - len(both), without - len(both)
+    return (name, *map(str, counts), _quartiles(both))
 
 
 def _pairs(found: Found, gains: str) -> list[tuple[float, float]]:
@@ -299,7 +332,7 @@ def study(folder: Path, room: Path, processes: int = 2) -> None:
         if done % step == 0:
             print(f"{done} of {len(every)}", flush=True)
 
-    further = list(others())
+    further = [*others(), *accounted()]
     rows = sweep([*every, *further], room, processes, tell=tell, measure=_measure)
     kept = ("end", METRIC, "theta_max_rad", "port_peak_J", "hand_work_J")
     columns = ("case", "seed", "method", "gains", "rate", "otherwise", *kept)
@@ -307,7 +340,10 @@ def study(folder: Path, room: Path, processes: int = 2) -> None:
         folder / "runs.csv", [{k: rounded(row).get(k, "") for k in columns} for row in rows]
     )
     found = Found(rows[: len(every)])
-    elsewhere = {n: Found(r for r in rows if r["otherwise"] == n) for n in OTHERWISE}
+    elsewhere, accounts = (
+        {name: Found(r for r in rows if r["otherwise"] == name) for name in names}
+        for names in (OTHERWISE, ACCOUNTS)
+    )
     draw(found, folder)
-    lines = "\n\n".join(page(found, elsewhere))
+    lines = "\n\n".join(page(found, elsewhere, accounts))
     (folder / "README.md").write_text(f"{lines}\n", encoding="utf-8")
