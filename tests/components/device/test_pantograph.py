@@ -49,9 +49,7 @@ estimate_4 = function(
     [ANGLES, POSE], lambda: [MODEL.place_from_angles(ANGLES, POSE, P, iterations=4)]
 )
 torques = function([WRENCH, POSE], lambda: [MODEL.motor_torques(WRENCH, POSE, P)])
-friction = function(
-    [ANGLES], lambda: [MODEL.friction_torques(ANGLES, ca.SX(FRICTION_RATE), ROUGH)]
-)
+friction = function([ANGLES], lambda: [MODEL.friction_torques(ANGLES, ca.SX(FRICTION_RATE), ROUGH)])
 
 
 def reach(pose):
