@@ -5,14 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.components.specs.device import Device, DeviceBody
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, near, shorten, unknown
-from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.scene.find_scene import list_shipped
 from hapticlink.orchestrator.scene.merge import merge
 from hapticlink.orchestrator.scene.toml_keys import (
@@ -171,22 +170,16 @@ def _read(
     if depth >= MAX_EXTENDED:
         raise InputFault(f"{shorten(name)}: the last of {MAX_EXTENDED} files, each over the next")
     file, text, where = find_device(name, folder)
-    base, tables, lines = _parse(file, text)
-    if base is None:
-        return plain(tables), lines
-    below, further = _read(base, where, depth + 1)
-    return merge(below, plain(tables), set()), further | lines
-
-
-@lru_cache(16)  # the same in each point of a sweep
-def _parse(file: str, text: str) -> tuple[Any, dict[str, Any], dict[Path, Place]]:
-    """What a device file extends, its tables, and file and line of each key."""
     try:
         tables, own = read_document(text)
     except ValueError as error:
         raise InputFault(f"{file}: not TOML: {error}") from error
+    lines = {key: (file, line) for key, line in own.items()}
     base = tables.pop("extends", None)
-    return base, tables, {key: (file, line) for key, line in own.items()}
+    if base is None:
+        return tables, lines
+    below, further = _read(base, where, depth + 1)
+    return merge(below, tables, set()), further | lines
 
 
 def put_likes(data: Mapping[str, Any]) -> list[Problem]:

@@ -402,7 +402,7 @@ def test_a_verdict_takes_so_many_equilibria_slopes_and_products(
 ) -> None:
     """As many on every machine, whatever numbers happen to repeat there."""
     work = SharedWork()
-    monkeypatch.setattr(judge_scene, "SharedWork", lambda: work)
+    monkeypatch.setattr(judge_scene, "SharedWork", lambda run: replace(work, run=run))
     hl.stability(scene, options)
     assert tuple(work.counts[of] for of in ("equilibria", "differentiated", "products")) == expected
 

@@ -95,7 +95,7 @@ def judged(folder: Path, rate: int) -> Passivity:
     place = SignalVector(made).scalar
     hand = HandPort(
         "hand", "device", ("F_h",), (place("hand", "F"),),
-        (place("device", "x"),), (place("device", "v"),),
+        (place("device", "x"),), (place("device", "v"),), 1,
     )  # fmt: skip
     port = MechanismPort(
         "mechanism", ((("F", -1.0),),), (place("mechanism", "x"),), (place("mechanism", "v"),)
