@@ -242,7 +242,7 @@ class ForwardSensitivity:
         reads = read_by(hold)
         J = np.zeros((after + len(by), before + len(reads)))
         J[:after, :before] = arrived
-        np.matmul(by[:, :after], arrived, out=J[after:, :before])
+        J[after:, :before] = by[:, :after] @ arrived
         J[after:, before:] = by[:, after:]
         return Applied(
             operation,
