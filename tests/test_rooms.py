@@ -32,10 +32,10 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7510,
     "fmus": 2992,
-    "orchestrator": 16521,
+    "orchestrator": 16518,
     "programs": 1027,
     "analysis": 9104,
-    "visualization": 3854,
+    "visualization": 3857,
     "api": 645,
     "commands": 1638,
 }

@@ -112,8 +112,9 @@ def _share(found: Found, bias: str, gains: str, rate: str) -> float | None:
 def _tracking(folder: Path, found: Found) -> Iterator[str]:
     drawn = _by_hold(found, DIRECT, lambda r: r[METRIC], np.median)
     cells = [(b, r) for b in BIAS for r in COLUMNS]
-    first = sum(found.advice[DIRECT, b, r].best.hold == "zoh" for b, r in cells)
-    title = f"zoh is the best hold in {first} of {len(cells)} rows"
+    best = Counter(found.advice[DIRECT, b, r].best.hold for b, r in cells)
+    (hold, first), *_ = best.most_common(1)
+    title = f"{hold.partition(',')[0]} is the best hold in {first} of {len(cells)} rows"
     none = [
         r for r in COLUMNS if not any(r in p and p[r].whole for _, by in drawn for p in by.values())
     ]

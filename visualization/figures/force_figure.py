@@ -13,7 +13,7 @@ from hapticlink.analysis.findings.forces import (
     torques,
     wrenches,
 )
-from hapticlink.analysis.findings.tracking import UserSignals, find_users
+from hapticlink.analysis.findings.tracking import UserSignals, find_users, space_of
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import Results
@@ -39,7 +39,9 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     }
     largest, (_, force, _) = max(drawn.items(), key=lambda item: item[1][1].max())
     title = f"The largest force is that of the {largest}: {short(force.max())} N"
-    labels = ["force (N)", "moment (N.m)", *(["motor torque (N.m)"] if driven else [])]
+    labels = ["force (N)", "moment (N.m)"][: 1 + any(space_of(results).turns)]
+    of_wrenches = len(labels)
+    labels += ["motor torque (N.m)"] if driven else []
     limits = {
         user: torque_limits(results, device, UserSignals.of(user))
         for user, device in devices.items()
@@ -55,22 +57,22 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     figure, axes = titled_axes(results, title, "time (s)", *labels)
     styles = dict(zip([user.name for user in find_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
-    for name, (time, force, moment) in drawn.items():
+    for name, (time, *force_and_moment) in drawn.items():
         user, _, kind = name.rpartition(": ")
         look = {"lw": 1, "color": CURVES[names.index(kind)], "ls": styles[user]}
-        axes[0].plot(time, force, label=name, **look)
-        axes[1].plot(time, moment, label=name, **look)
-    for each in axes[:2]:
+        for each, values in zip(axes[:of_wrenches], force_and_moment, strict=False):
+            each.plot(time, values, label=name, **look)
+    for each in axes[:of_wrenches]:
         legend_above_curves(each, columns=2)
     for user, (time, *tau) in driven.items():
         for i, each in enumerate(tau):
             label = None if user else f"motor {i + 1}"
-            axes[2].plot(time, each, lw=1, color=CURVES[i], ls=styles[user], label=label)
+            axes[-1].plot(time, each, lw=1, color=CURVES[i], ls=styles[user], label=label)
         known = limits[user]
         ends = () if known is None else {sign * limit for limit in known for sign in (-1, 1)}
         for end in sorted(ends):
             label = None if user or end != max(ends) else "limit"
-            axes[2].axhline(end, color="k", lw=0.8, ls="--", label=label)
+            axes[-1].axhline(end, color="k", lw=0.8, ls="--", label=label)
     if driven:
-        legend_above_curves(axes[2], columns=5)
+        legend_above_curves(axes[-1], columns=5)
     return figure

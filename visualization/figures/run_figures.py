@@ -25,6 +25,7 @@ from hapticlink.analysis.findings.tracking import (
     of_block,
     of_port,
     pose_error,
+    space_of,
 )
 from hapticlink.analysis.findings.user_port import UserPort, tolerated_energy, user_port
 from hapticlink.components.specs.contacts import Contacts
@@ -330,13 +331,14 @@ def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
     axes.step(time, count, where="post")
     if most < 10:
         axes.set(yticks=range(max(most, 3) + 1), ylim=(-0.15, max(most, 3) + 0.15))
+    third = "rotation" if any(space_of(results).turns) else "z"
     free = axes.secondary_yaxis("right", functions=(_free, _free))
-    free.set(yticks=range(4), ylabel="directions free to move, of x, y and rotation")
+    free.set(yticks=range(4), ylabel=f"directions free to move, of x, y and {third}")
     return figure
 
 
 def _free(constrained: Vector) -> Vector:
-    """The number of directions of motion in the plane that are not constrained; its own inverse."""
+    """The number of the three directions of motion that are not constrained; its own inverse."""
     return 3 - constrained
 
 
