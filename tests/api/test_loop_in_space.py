@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.visualization.figures import run_figures
 
 FAST = {"haptics__rate": 512, "graphics__rate": 64, "duration": 0.0625}
 """As the observer wants it."""
@@ -28,6 +29,14 @@ def test_the_whole_loop_keeps_the_handle_at_the_point():
     assert not found.tracking().angle_rad.any()
     assert np.ptp(found["virtual_mechanism.x"], axis=0).min() > 1e-3
     assert (found["virtual_environment.n_constraints"] == 2).all()
+
+
+def test_figures_of_a_point_have_no_moments():
+    figures = run_figures.figures(ran(graphics__rate=16))
+    labels = [axes.get_ylabel() for axes in figures["forces"].axes]
+    assert labels == ["force (N)", "motor torque (N.m)"]
+    (free,) = figures["constraints"].axes[0].child_axes
+    assert free.get_ylabel() == "directions free to move, of x, y and z"
 
 
 def test_projector_and_mobility_of_the_copy_are_those_of_its_pose():
