@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -118,13 +119,14 @@ def from_source(source: Source) -> Scene:
         with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]
             recorded["rate"] = read_frame_times(FilePath(file))
+    start = _start_time(data)
     for path, holder, key in [*find_recorded_tables(data)]:
         with collect_problem(wrong, (*path, key)):
             if path[0] == "fmu":
                 read_log(holder)
                 continue
             columns = COLUMNS[key] if path[0] in ("hand", "hands") else ()
-            holder[key] = read_recorded_table(holder.pop(key), columns)
+            holder[key] = read_recorded_table(holder.pop(key), columns, start)
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):
@@ -143,3 +145,9 @@ def from_source(source: Source) -> Scene:
     return WrittenScene(
         **vars(scene), read_from=read_from, origin=origin, written=scene, signals=moved
     )
+
+
+def _start_time(data: Mapping[str, Any]) -> float:
+    """That of a scene whose values have not been checked."""
+    given = data.get("start_time")
+    return float(given) if type(given) in (int, float) and math.isfinite(given) else 0.0

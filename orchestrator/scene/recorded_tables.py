@@ -4,8 +4,8 @@
     type = "profile"
     table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.m"] }
 
-The file is a CSV of numbers; a first line that is none has the names of its columns. Times count
-from the first row. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
+The file is a CSV of numbers; a first line that is none has the names of its columns. The times of a
+signal are those of the run; the first row of a hand or drive is at the run's start. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
 so that a run's own `haptics.csv` is a log: columns = ["time", "hand.F"].
 """
 
@@ -88,9 +88,11 @@ def signal_tables(
                 yield (name, i), entry, key
 
 
-def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -> list[list[float]]:
-    """The rows (time, values) in SI units, `columns` where they are known. Raises ValueError for
-    unknown keys, columns and units, for a unit of another dimension, and for what is no finite
+def read_recorded_table(
+    given: Mapping[str, Any], columns: Sequence[str] = (), start: float | None = None
+) -> list[list[float]]:
+    """The rows (time, values) in SI units, `columns` where they are known, from `start` on (s), or
+    at the times that the file has. Raises ValueError for unknown keys, columns and units, for a unit of another dimension, and for what is no finite
     number, with its line; InputFault for a file that cannot be read."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
@@ -111,7 +113,8 @@ def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -
     each = [[_entry(path, *row, place) for place in places] for row in rows]
     # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
     times, scale = [Decimal(fields[places[0]].strip()) for _, fields in rows], repr(factors[0])
-    seconds = (float((time - times[0]) * Decimal(scale)) for time in times)
+    begin = Decimal(0) if start is None else Decimal(repr(start)) - times[0] * Decimal(scale)
+    seconds = (float(time * Decimal(scale) + begin) for time in times)
     return [
         [time, *(value * f for value, f in zip(values[1:], factors[1:], strict=True))]
         for time, values in zip(seconds, each, strict=True)

@@ -44,6 +44,18 @@ def test_a_sine_acts_as_in_fmpy_with_that_start_time(tmp_path, isolate):
     np.testing.assert_array_equal(found["fed.gained"], np.where(time < 2.5, 1.0, 3.0))
 
 
+def test_what_was_recorded_from_a_start_time_on_drives_another_run_from_there(tmp_path):
+    """To the same bits: an input over time, and a hand."""
+    hand = {"type": "profile", "table": [[2.3, 0.0, 0.0, 0.0], [2.4, 0.3, 0.1, 0.0]]}
+    options = {"start_time": 2.3, "duration": 0.1, "hand": hand}
+    own = hl.run("closed-loop-ideal", options, out=tmp_path / "own", figures=False)
+    log = {"path": str(tmp_path / "own" / "haptics.csv"), "columns": ["time", "hand.F"]}
+    fed = {"connection.+": {"from": {"table": log}, "to": "haptic_device.F_hand"}}
+    for again in ({"hand": {"type": "profile", "table": log}}, fed):
+        run = hl.run("closed-loop-ideal", options | again)
+        assert np.array_equal(own["haptic_device.x_true"], run["haptic_device.x_true"])
+
+
 @pytest.mark.parametrize("fmi", ["2", "3"])
 def test_model_exchange_has_the_bits_of_fmpy(tmp_path, fmi):
     path = equations_fmu(tmp_path, fmi)
