@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -150,4 +149,4 @@ def from_source(source: Source) -> Scene:
 def _start_time(data: Mapping[str, Any]) -> float:
     """That of a scene whose values have not been checked."""
     given = data.get("start_time")
-    return float(given) if type(given) in (int, float) and math.isfinite(given) else 0.0
+    return float(given) if isinstance(given, int | float) and 0 <= given <= 1e5 else 0.0

@@ -5,8 +5,9 @@
     table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.m"] }
 
 The file is a CSV of numbers; a first line that is none has the names of its columns. The times of a
-signal are those of the run; the first row of a hand or drive is at the run's start. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
-so that a run's own `haptics.csv` is a log: columns = ["time", "hand.F"].
+signal are those of the run; the first row of a hand or drive is at the run's start. A column that
+is named `F` stands for `F[1]`, `F[2]`, ... where these are there, so that a run's own `haptics.csv`
+is a log: columns = ["time", "hand.F"].
 """
 
 from __future__ import annotations
@@ -92,8 +93,9 @@ def read_recorded_table(
     given: Mapping[str, Any], columns: Sequence[str] = (), start: float | None = None
 ) -> list[list[float]]:
     """The rows (time, values) in SI units, `columns` where they are known, from `start` on (s), or
-    at the times that the file has. Raises ValueError for unknown keys, columns and units, for a unit of another dimension, and for what is no finite
-    number, with its line; InputFault for a file that cannot be read."""
+    at the times that the file has; `true` is 1, `false` 0. Raises ValueError for unknown keys,
+    columns and units, for a unit of another dimension, and for what is no finite number, with its
+    line; InputFault for a file that cannot be read."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
     path = Path(str(given["path"]))
@@ -110,7 +112,7 @@ def read_recorded_table(
     ]
     if not rows:
         raise ValueError(f"{path}: it has no rows")
-    each = [[_entry(path, *row, place) for place in places] for row in rows]
+    each = [[_entry(path, *row, place, place != places[0]) for place in places] for row in rows]
     # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
     times, scale = [Decimal(fields[places[0]].strip()) for _, fields in rows], repr(factors[0])
     begin = Decimal(0) if start is None else Decimal(repr(start)) - times[0] * Decimal(scale)
@@ -160,8 +162,10 @@ def _is_si(unit: str) -> bool:
     return True
 
 
-def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:
+def _entry(path: Path, number: int, fields: Sequence[str], place: int, of_a_value: bool) -> float:
     field = fields[place] if place < len(fields) else ""
+    if of_a_value and (truth := field.strip().lower()) in ("true", "false"):
+        return float(truth == "true")
     if (value := _number(field)) is None:
         raise ValueError(f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no number")
     if not math.isfinite(value):

@@ -184,12 +184,13 @@ def test_a_shorter_run_is_no_other_rate(small):
     ("change", "why"),
     [
         (lambda text: text[:-9] + "x" + text[-8:], "damaged, its checksum is another"),
+        (lambda text: text[:-9] + "é" + text[-8:], "damaged, its checksum is another"),
         (lambda text: "title = 1", "no state of a run: give a file that `run --save` wrote"),
     ],
 )
 def test_a_file_that_is_no_state(small, tmp_path, change, why):
     path = tmp_path / "a.state"
-    path.write_text(change(small.read_text()))
+    path.write_bytes(change(small.read_text()).encode("latin-1"))
     with pytest.raises(InputFault, match=why):
         hl.run(path)
 
