@@ -159,6 +159,7 @@ def test_another_hold_begins_with_the_newest_sample(small):
         ({"controller.topology": True}, "controller is another FMU: leave what it is made of"),
         ({"coupling": "jacobi"}, "coupling is another: leave it as it was"),
         ({"at": SET[:1]}, "[[at]] noise of 0.0001 on controller.x_D until 0.6 s, at 0.2 s, has"),
+        ({"at.1.seed": 7}, "noise of 0.0001 on controller.x_D until 0.6 s, at 0.2 s, has acted"),
         ({"at": [*SET, {"time": 0.25, "set": {"hand.damping": [0.0, 0.0, 0.0]}}]}, "is past"),
         ({"controller.teleoperation.stiffness": [1.0] * 3}, "controller.K_pc[1] is set by [[at]],"),
         ({"delays": {"controller.Lambda_inv": 0.01}}, "in the state: leave hold, latency and kind"),
