@@ -114,11 +114,11 @@ def from_source(source: Source) -> Scene:
     flatten(data)
     data, moved = with_signals(data)
     wrong: list[Problem] = []
+    start = _start_time(data)
     for path, recorded in find_traces(data):
         with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]
-            recorded["rate"] = read_frame_times(FilePath(file))
-    start = _start_time(data)
+            recorded["rate"] = read_frame_times(FilePath(file), start)
     for path, holder, key in [*find_recorded_tables(data)]:
         with collect_problem(wrong, (*path, key)):
             if path[0] == "fmu":

@@ -112,13 +112,18 @@ def test_where_nothing_depends_on_time_only_the_times_differ(tmp_path, start):
         assert whole[-n:] == rest[1:]
 
 
-def test_frames_at_times_of_their_own_end_then():
+def test_frames_at_times_of_their_own_end_then(tmp_path):
+    """A trace counts from its first stamp, at which the run begins."""
     frames = [0.5, 2.03, 2.06, 2.11, 2.2]
     run = hl.run("closed-loop-ideal", HELD | {"graphics.rate": frames, "start_time": 2.0})
     found, near = run.tables["graphics"]["time"], 1 / 512
     assert found[0] == 2.0
     assert all(0 <= b - a < near for a, b in zip(frames[1:3], found[1:], strict=True))
     assert all(b > a for a, b in pairwise(found))
+    (tmp_path / "frames.csv").write_text("7.0\n7.03\n7.06\n7.11\n7.2\n")
+    trace = {"trace": str(tmp_path / "frames.csv")}
+    again = hl.run("closed-loop-ideal", HELD | {"graphics.rate": trace, "start_time": 2.0})
+    assert np.array_equal(again.tables["graphics"]["time"], found)
 
 
 @pytest.mark.parametrize("command", ["stability", "build --as-one", "run --real-time", "view"])
