@@ -155,8 +155,13 @@ def test_a_scene_lies_over_the_one_that_it_extends(tmp_path):
 def test_scenes_of_the_same_numbers_share_mechanism_and_device(monkeypatch) -> None:
     """Numbers of the same bits alone; a device file is parsed once."""
     parsed = []
-    loads = device_files.loads
-    monkeypatch.setattr(device_files, "loads", lambda text: [parsed.append(text), loads(text)][1])
+    read = device_files.read_document
+
+    def read_document(text: str) -> object:
+        parsed.append(text)
+        return read(text)
+
+    monkeypatch.setattr(device_files, "read_document", read_document)
     device_files._parse.cache_clear()
     options = ["hand.wrench=[0.1, 0, 0]", "device.motor.damping=0.0", "device.motor.damping=-0.0"]
     one, other, negative = (open_scene.load("closed-loop-ideal", [option]) for option in options)
