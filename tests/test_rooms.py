@@ -30,9 +30,9 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7498,
+    "components": 7503,
     "fmus": 2992,
-    "orchestrator": 16519,
+    "orchestrator": 16565,
     "programs": 1027,
     "analysis": 9106,
     "visualization": 3856,
