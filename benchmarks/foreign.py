@@ -127,7 +127,7 @@ def page(rows: list[Row], command: str) -> str:
         "",
         f"{_count(fmu[0] for fmu in ran)} FMUs run in hapticlink and in FMPy. By co-simulation "
         f"{_equal(row for row in compared if row not in exchange)}. {_count(not_run)} others are "
-        "not run; the second table says why.",
+        "not run, or not compared; the second table says why.",
         "",
         f"By model exchange {_count(exchange)} of the FMUs run, "
         f"{_count(row for row in exchange if _comparison(row).events)} of these with events (their "
@@ -157,7 +157,7 @@ def page(rows: list[Row], command: str) -> str:
         *_tolerance_table([*exchange, *rows]),
         "## Not run",
         "",
-        "In hapticlink's own words.",
+        "Or not compared. In hapticlink's own words.",
         "",
         *table("FMU | from | made by | FMI | by | why", "lllrll", map(_not_run_cells, not_run)),
         "",
@@ -293,6 +293,8 @@ def _not_run_cells(row: Row) -> tuple[str, ...]:
     why = found.hapticlink
     if found.rows and found.fmpy:
         why = f"hapticlink runs it ({found.rows} rows), FMPy does not: {found.fmpy}"
+    elif found.rows and not found.outputs:
+        why = f"both run it ({found.rows} rows); it has no output and no state to compare"
     return *_about(row), why.replace("|", "\\|")
 
 

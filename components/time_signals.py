@@ -71,6 +71,11 @@ def check_rows(rows: Rows, name: str) -> NDArray[np.float64]:
     are not finite and for times that do not increase."""
     if not rows:
         raise ValueError(f"`{name}`: the table has no rows; give at least one")
+    for i, row in enumerate(rows):
+        if len(row) != len(rows[0]):
+            raise ValueError(
+                f"`{name}`: row {i + 1} has {len(row)} numbers, the first one {len(rows[0])}"
+            )
     data = np.array(rows, dtype="<f8")
     for i in np.flatnonzero(~np.isfinite(data).all(axis=1)).tolist():
         raise ValueError(f"`{name}`: row {i + 1} is {rows[i]}; give finite numbers")

@@ -33,7 +33,9 @@ def write_state(path: Path, content: Mapping[str, Any]) -> None:
 
 def read_state(path: Path) -> dict[str, Any]:
     """The content of the file. Raises InputFault where it is no state or is damaged."""
-    first, _, rest = text_files.read_text(path, "a state", LARGEST).partition("\n")
+    # Any byte is a character of Latin-1: what is damaged is told by the checksum.
+    text = text_files.read_text(path, "a state", LARGEST, "latin-1")
+    first, _, rest = text.partition("\n")
     if first != _FIRST:
         raise InputFault(f"{path}: no state of a run: give a file that `run --save` wrote")
     checksum, _, body = rest.partition("\n")

@@ -195,7 +195,8 @@ def _capture_hold(hold: CompiledHold) -> dict[str, Any]:
 
 
 def _capture_change(change: InputChange, setter: InputSetter) -> dict[str, Any]:
-    return {"text": change.text, "time": change.time, "begin": change.begin, **setter.saved()}
+    told = {"text": change.text, "time": change.time, "begin": change.begin, "key": change.key}
+    return {**told, **setter.saved()}
 
 
 # --- plugins' holds ---------------------------------------------------------------------------
@@ -327,20 +328,16 @@ def _begin_hold(c: Connection, simulation: Simulation, loop: CompiledLoop) -> No
 def _restore_changes(state: RunState, simulation: Simulation) -> None:
     """Lets changes wait that come later, or that still act, and start values that are new act from
     the first step on."""
-    saved = {key_of_change(each): each for each in state.content["changes"]}
+    saved = {each["key"]: each for each in state.content["changes"]}
     for instance in simulation.instances.values():
         instance.forget_settings()
     for change, setter in simulation.changing:
-        if kept := saved.get((change.text, change.time)):
+        if kept := saved.get(change.key):
             setter.restore(kept)
         else:
             setter.wait(change.begin)
     for change in new_starts(state, simulation.system):
         InputSetter(change, simulation).wait()
-
-
-def key_of_change(change: Mapping[str, Any]) -> tuple[str, float]:
-    return change["text"], change["time"]
 
 
 def new_starts(state: RunState, system: System) -> Iterator[InputChange]:

@@ -9,7 +9,6 @@ from typing import Any
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.run.run_state import (
     RunState,
-    key_of_change,
     new_starts,
     order_of_calls,
     with_other_holds,
@@ -80,13 +79,13 @@ def _why_other_clocks(state: RunState, system: System) -> Iterator[str]:
 
 
 def _why_other_changes(state: RunState, system: System) -> Iterator[str]:
-    saved = {key_of_change(each) for each in state.content["changes"]}
-    now = {(c.text, c.time): c for c in system.changes if c.fmu}
+    saved = {each["key"] for each in state.content["changes"]}
+    now = {c.key: c for c in system.changes if c.fmu}
     for key, change in now.items():
         if key not in saved and change.begin < state.time:
             yield f"[[at]] {change.text}, at {change.time:g} s, is past: take a later time"
     for each in state.content["changes"]:
-        if key_of_change(each) not in now and each["begin"] < state.time:
+        if each["key"] not in now and each["begin"] < state.time:
             yield f"[[at]] {each['text']}, at {each['time']:g} s, has acted: leave it in the scene"
 
 

@@ -75,9 +75,9 @@ class Trace:
     frames ended."""
 
 
-def read_frame_times(path: FilePath) -> list[float]:
-    """The ends of the frames (s), counted from the first stamp. Raises InputFault, with the line,
-    for a file that is no trace."""
+def read_frame_times(path: FilePath, start: float = 0.0) -> list[float]:
+    """The ends of the frames (s), where the first stamp is at `start`. Raises InputFault, with the
+    line, for a file that is no trace."""
     lines = text_files.read_text(path, "a trace of frames", LARGEST).splitlines()
     stamps: list[Decimal] = []
     for number, line in enumerate(lines, start=1):
@@ -98,7 +98,7 @@ def read_frame_times(path: FilePath) -> list[float]:
     if len(stamps) < 2:
         raise InputFault(f"{path}: {len(stamps)} time stamps; a trace of frames has at least 2")
     # Decimals subtract exactly: 1.7 - 1.6 is 0.1.
-    return [float(stamp - stamps[0]) for stamp in stamps[1:]]
+    return [float(stamp - stamps[0] + Decimal(repr(start))) for stamp in stamps[1:]]
 
 
 def find_traces(data: Mapping[str, Any]) -> list[tuple[tuple[str | int, ...], dict[str, Any]]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
@@ -114,17 +114,18 @@ def from_source(source: Source) -> Scene:
     flatten(data)
     data, moved = with_signals(data)
     wrong: list[Problem] = []
+    start = _start_time(data)
     for path, recorded in find_traces(data):
         with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]
-            recorded["rate"] = read_frame_times(FilePath(file))
+            recorded["rate"] = read_frame_times(FilePath(file), start)
     for path, holder, key in [*find_recorded_tables(data)]:
         with collect_problem(wrong, (*path, key)):
             if path[0] == "fmu":
                 read_log(holder)
                 continue
             columns = COLUMNS[key] if path[0] in ("hand", "hands") else ()
-            holder[key] = read_recorded_table(holder.pop(key), columns)
+            holder[key] = read_recorded_table(holder.pop(key), columns, start)
     for fmu in tables_of(data, "fmu"):
         for key in ("start", "derivatives"):
             if isinstance(fmu.get(key), dict):
@@ -143,3 +144,9 @@ def from_source(source: Source) -> Scene:
     return WrittenScene(
         **vars(scene), read_from=read_from, origin=origin, written=scene, signals=moved
     )
+
+
+def _start_time(data: Mapping[str, Any]) -> float:
+    """That of a scene whose values have not been checked."""
+    given = data.get("start_time")
+    return float(given) if isinstance(given, int | float) and 0 <= given <= 1e5 else 0.0

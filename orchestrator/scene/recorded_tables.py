@@ -4,9 +4,10 @@
     type = "profile"
     table = { path = "log.csv", columns = ["t", "Fx", "Fy", "Tz"], units = ["ms", "N", "N", "N.m"] }
 
-The file is a CSV of numbers; a first line that is none has the names of its columns. Times count
-from the first row. A column that is named `F` stands for `F[1]`, `F[2]`, ... where these are there,
-so that a run's own `haptics.csv` is a log: columns = ["time", "hand.F"].
+The file is a CSV of numbers; a first line that is none has the names of its columns. The times of a
+signal are those of the run; the first row of a hand or drive is at the run's start. A column that
+is named `F` stands for `F[1]`, `F[2]`, ... where these are there, so that a run's own `haptics.csv`
+is a log: columns = ["time", "hand.F"].
 """
 
 from __future__ import annotations
@@ -88,10 +89,13 @@ def signal_tables(
                 yield (name, i), entry, key
 
 
-def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -> list[list[float]]:
-    """The rows (time, values) in SI units, `columns` where they are known. Raises ValueError for
-    unknown keys, columns and units, for a unit of another dimension, and for what is no finite
-    number, with its line; InputFault for a file that cannot be read."""
+def read_recorded_table(
+    given: Mapping[str, Any], columns: Sequence[str] = (), start: float | None = None
+) -> list[list[float]]:
+    """The rows (time, values) in SI units, `columns` where they are known, from `start` on (s), or
+    at the times that the file has; `true` is 1, `false` 0. Raises ValueError for unknown keys,
+    columns and units, for a unit of another dimension, and for what is no finite number, with its
+    line; InputFault for a file that cannot be read."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
     path = Path(str(given["path"]))
@@ -108,10 +112,11 @@ def read_recorded_table(given: Mapping[str, Any], columns: Sequence[str] = ()) -
     ]
     if not rows:
         raise ValueError(f"{path}: it has no rows")
-    each = [[_entry(path, *row, place) for place in places] for row in rows]
+    each = [[_entry(path, *row, place, place != places[0]) for place in places] for row in rows]
     # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
     times, scale = [Decimal(fields[places[0]].strip()) for _, fields in rows], repr(factors[0])
-    seconds = (float((time - times[0]) * Decimal(scale)) for time in times)
+    begin = Decimal(0) if start is None else Decimal(repr(start)) - times[0] * Decimal(scale)
+    seconds = (float(time * Decimal(scale) + begin) for time in times)
     return [
         [time, *(value * f for value, f in zip(values[1:], factors[1:], strict=True))]
         for time, values in zip(seconds, each, strict=True)
@@ -157,8 +162,10 @@ def _is_si(unit: str) -> bool:
     return True
 
 
-def _entry(path: Path, number: int, fields: Sequence[str], place: int) -> float:
+def _entry(path: Path, number: int, fields: Sequence[str], place: int, of_a_value: bool) -> float:
     field = fields[place] if place < len(fields) else ""
+    if of_a_value and (truth := field.strip().lower()) in ("true", "false"):
+        return float(truth == "true")
     if (value := _number(field)) is None:
         raise ValueError(f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no number")
     if not math.isfinite(value):

@@ -26,7 +26,7 @@ _NAMESPACE = "{http://opensimulationplatform.com/MSMI/OSPSystemStructure}"
 _VALUES: dict[str, Callable[[str], Any]] = {
     "Real": float,
     "Integer": int,
-    "Boolean": lambda text: text in ("true", "1"),
+    "Boolean": {"true": True, "1": True, "false": False, "0": False}.__getitem__,
     "String": str,
 }
 
@@ -58,6 +58,8 @@ class _System:
         if end:
             self.tables["duration"] = float(exact(end) - exact(start or 0))
         if base:
+            if not exact(base):
+                raise self._refuse(f"BaseStepSize = {base}: write a number above 0")
             self.tables["haptics"] = {"rate": str(1 / exact(base))}
         self.tables["fmu"] = [self._fmu(s, base) for s in simulators]
         self._functions = {f.get("name", ""): f for f in root.iterfind(f"{_NAMESPACE}Functions/*")}
@@ -93,13 +95,20 @@ class _System:
         if (step := self._number(simulator, "stepSize")) and base:
             found["rate"] = str(1 / (max(round(exact(step) / exact(base)), 1) * exact(base)))
         found["start"] = {
-            value.get("variable", ""): _VALUES[given.tag.removeprefix(_NAMESPACE)](
-                given.get("value", "")
-            )
+            value.get("variable", ""): self._value(f"{name}.{value.get('variable')}", given)
             for value in _all(simulator, "InitialValues/InitialValue")
             for given in value
         }
         return found
+
+    def _value(self, of: str, given: Element) -> bool | float | str:
+        kind, text = given.tag.removeprefix(_NAMESPACE), given.get("value", "")
+        if kind not in _VALUES:
+            raise self._refuse(f"{of}: {kind} is none of {', '.join(_VALUES)}")
+        try:
+            return _VALUES[kind](text)
+        except (ValueError, KeyError):
+            raise self._refuse(f"{of} = {text}: no {kind}") from None
 
     def _connections(self, root: Element) -> Iterator[dict[str, Any]]:
         into: dict[str, str] = {}
@@ -109,6 +118,8 @@ class _System:
             if kind not in ("VariableConnection", "SignalConnection"):
                 raise self._refuse(f"{kind}: write a VariableConnection for each of its variables")
             ends = [*connection]
+            if len(ends) != 2:
+                raise self._refuse(f"{kind}: it has {len(ends)} ends, not 2")
             if kind == "VariableConnection":
                 yield self._wire(*self._sorted(ends))
             elif ends[0].tag == f"{_NAMESPACE}Signal":
@@ -118,11 +129,17 @@ class _System:
         for function, target in out_of:
             if function not in into:
                 raise self._refuse(f"function {function}: nothing is connected to its input")
-            given = self._functions[function]
             yield self._wire(into[function], target) | {
-                key: float(given.get(key, default))
+                key: self._term(function, key, default)
                 for key, default in (("factor", "1"), ("offset", "0"))
             }
+
+    def _term(self, function: str, key: str, default: str) -> float:
+        text = self._functions[function].get(key, default)
+        try:
+            return float(text)
+        except ValueError:
+            raise self._refuse(f"function {function}: {key} = {text}: write a number") from None
 
     def _wire(self, source: str, target: str) -> dict[str, Any]:
         return {"from": source, "to": target, "convert": False}

@@ -20,6 +20,7 @@ from hapticlink.orchestrator.scene.scene_tables import ForeignFmu, Value
 from hapticlink.orchestrator.scene.toml_keys import Problem, collect_problem
 from hapticlink.orchestrator.system.port_map import (
     Mapped,
+    UnfitMap,
     in_units_of,
     map_ports,
     rename_ports,
@@ -49,8 +50,8 @@ def fmus(
         if block:
             try:
                 names = map_ports(description, block, fmu.map)
-            except ValueError as fault:
-                problems.append((("fmu", i, "map"), str(fault)))
+            except UnfitMap as fault:
+                problems.append((("fmu", i, "map", fault.port), str(fault)))
                 continue
             description = in_units_of(rename_ports(description, names, block), block)
             description = with_declarations(description, block)

@@ -65,20 +65,23 @@ def choose_outputs(
         known = list(dict.fromkeys(name for names in called.values() for name in sorted(names)))
         chosen = {name for name in known if any(_fits(asked, [name]) for asked in record.signals)}
         problems += [
-            (
-                ("record", "signals", i),
-                f"{name!r} is no FMU, nor variable of one; {_hint(name, known)}",
-            )
+            (("record", "signals", i), _why_nothing(name, system, known))
             for i, name in enumerate(record.signals)
             if not _fits(name, known)
         ]
     return tuple(name for name, names in called.items() if names & chosen)
 
 
-def _hint(name: str, known: Sequence[str]) -> str:
-    """What was meant: there are too many outputs to list."""
-    hint = near(name, known)
-    if not hint.startswith("there are"):
-        return hint
-    fmus = (n for n in known if "." not in n)
-    return f"the FMUs are {', '.join(fmus)}; --explain tells what is recorded"
+def _why_nothing(name: str, system: System, known: Sequence[str]) -> str:
+    """Why nothing that is recorded fits, and what was meant: there are too many outputs to list."""
+    fmus = [fmu.name for fmu in system.fmus]
+    if name in fmus:
+        return f"{name!r} has no output that is a number; '{name}.*' are all of its variables"
+    for fmu in system.fmus:
+        for s in fmu.description.strings:
+            if _fits(name, (f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}")):
+                return f"{name!r} is a {s.type}, and tables have numbers alone"
+    hint = near(name, [*fmus, *known])
+    if hint.startswith("there are"):
+        hint = f"the FMUs are {', '.join(fmus)}; --explain tells what is recorded"
+    return f"{name!r} is no FMU, nor variable of one; {hint}"

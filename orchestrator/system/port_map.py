@@ -46,6 +46,14 @@ class Term(NamedTuple):
         return f"{self.factor!r}*{self.name}" if sign is None else sign + self.name
 
 
+class UnfitMap(ValueError):
+    """What a `map` gives for a port, and cannot be."""
+
+    def __init__(self, port: str, why: object) -> None:
+        super().__init__(str(why))
+        self.port = port
+
+
 Mapped = dict[str, tuple[Term, ...]]
 """By the block's port, what its entries are in the FMU, row by row."""
 
@@ -53,26 +61,25 @@ Mapped = dict[str, tuple[Term, ...]]
 def map_ports(
     description: Description, block: Component, given: Mapping[str, str | tuple[str, ...]]
 ) -> Mapped:
-    """What is called otherwise in an FMU than in the block that it replaces. Raises ValueError for
+    """What is called otherwise in an FMU than in the block that it replaces. Raises UnfitMap for
     a port or variable that there is not, and for a number of variables that is not the port's."""
     causes = {"input": block.inputs, "output": block.outputs, "parameter": block.parameters}
     ports = {v.name: (v, cause) for cause, variables in causes.items() for v in variables}
     renamings: Mapped = {}
+    taken: set[str] = set()
     for port, names in given.items():
         if port not in ports:
             there = unknown("port of the block", port, ports)
             hint = "what it has with other settings alone is fed by a [[connection]]"
-            raise ValueError(f"{there}; {hint}")
-        renamings[port] = tuple(_find_terms(description, names))
-        if len(renamings[port]) != (size := ports[port][0].size):
-            raise ValueError(f"{len(renamings[port])} variables for the {size} entries of {port}")
-        own = {s.name for s in description.scalars if port in (s.name, s.port)}
-        if own - {term.name for term in renamings[port]}:
-            raise ValueError(f"the FMU has a port {port} of its own: take {port} out of the map")
-        _check_factors(description, *ports[port], renamings[port])
-    every = [term.name for terms in renamings.values() for term in terms]
-    if twice := [name for name in every if every.count(name) > 1]:
-        raise ValueError(f"{twice[0]} is given twice")
+            raise UnfitMap(port, f"{there}; {hint}")
+        try:
+            renamings[port] = _renaming(description, *ports[port], names)
+        except ValueError as fault:
+            raise UnfitMap(port, fault) from fault
+        for term in renamings[port]:
+            if term.name in taken:
+                raise UnfitMap(port, f"{term.name} is given twice")
+            taken.add(term.name)
     for port, (variable, cause) in ports.items():
         taken = {term.name for terms in renamings.values() for term in terms}
         free = [s for s in description.scalars if s.causality == cause and s.name not in taken]
@@ -80,6 +87,21 @@ def map_ports(
             left = [s for s in free if s.port not in ports]
             renamings |= {port: terms} if (terms := _alike(variable, left)) else {}
     return renamings
+
+
+def _renaming(
+    description: Description, port: Variable, causality: str, names: str | tuple[str, ...]
+) -> tuple[Term, ...]:
+    terms = tuple(_find_terms(description, names))
+    if len(terms) != port.size:
+        raise ValueError(f"{len(terms)} variables for the {port.size} entries of {port.name}")
+    own = {s.name for s in description.scalars if port.name in (s.name, s.port)}
+    if own - {term.name for term in terms}:
+        raise ValueError(
+            f"the FMU has a port {port.name} of its own: take {port.name} out of the map"
+        )
+    _check_factors(description, port, causality, terms)
+    return terms
 
 
 def in_units_of(description: Description, block: Component) -> Description:

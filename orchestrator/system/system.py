@@ -203,6 +203,11 @@ class InputChange:
     noise: float = 0.0
     seed: int = 0
 
+    @property
+    def key(self) -> tuple[object, ...]:
+        """By which it is known among those of a state; `text` is shortened."""
+        return self.text, self.time, self.values, self.noise, self.seed
+
 
 @dataclass(frozen=True)
 class System:

@@ -14,6 +14,7 @@ from hapticlink.orchestrator.experiment import Experiment, simulate
 from tests.little_fmus import python_fmu, slave
 from tests.orchestrator.c_fmus import NUMBERS, c_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, scene, wire_table
+from tests.orchestrator.foreign_scenes import ran as ran_foreign
 
 SCENE, SHORT = "closed-loop-ideal", ("duration=0.5",)
 TOLD = ("end", "fault", "energies", "energies_within_a_rate", "step_errors", "delays", "unstable")
@@ -207,6 +208,13 @@ def test_what_is_no_output_changes_nothing_of_a_run(whole, tmp_path, packaging):
 def test_a_pattern_that_fits_nothing_is_refused(tmp_path):
     with pytest.raises(SceneFault, match=r"'virtual_mechanism\.nope\*' is no FMU, nor variable"):
         simulate(SCENE, tmp_path, ('record.signals=["virtual_mechanism.nope*"]',))
+
+
+def test_a_text_and_an_fmu_that_gives_no_number_are_told(tmp_path):
+    slave(tmp_path, "Says", ("input", {"u": 0.0}), ("output", {"word": "none"}))
+    for name, why in (("says", "has no output that is a number"), ("says.word", "is a String")):
+        with pytest.raises(SceneFault, match=f"'{name}' {why}"):
+            ran_foreign(tmp_path, fmu_table("says", "Says"), f"record.signals=['{name}']")
 
 
 def test_a_run_without_the_pose_of_its_point_is_drawn(tmp_path):

@@ -159,6 +159,7 @@ def test_another_hold_begins_with_the_newest_sample(small):
         ({"controller.topology": True}, "controller is another FMU: leave what it is made of"),
         ({"coupling": "jacobi"}, "coupling is another: leave it as it was"),
         ({"at": SET[:1]}, "[[at]] noise of 0.0001 on controller.x_D until 0.6 s, at 0.2 s, has"),
+        ({"at.1.seed": 7}, "noise of 0.0001 on controller.x_D until 0.6 s, at 0.2 s, has acted"),
         ({"at": [*SET, {"time": 0.25, "set": {"hand.damping": [0.0, 0.0, 0.0]}}]}, "is past"),
         ({"controller.teleoperation.stiffness": [1.0] * 3}, "controller.K_pc[1] is set by [[at]],"),
         ({"delays": {"controller.Lambda_inv": 0.01}}, "in the state: leave hold, latency and kind"),
@@ -184,12 +185,13 @@ def test_a_shorter_run_is_no_other_rate(small):
     ("change", "why"),
     [
         (lambda text: text[:-9] + "x" + text[-8:], "damaged, its checksum is another"),
+        (lambda text: text[:-9] + "é" + text[-8:], "damaged, its checksum is another"),
         (lambda text: "title = 1", "no state of a run: give a file that `run --save` wrote"),
     ],
 )
 def test_a_file_that_is_no_state(small, tmp_path, change, why):
     path = tmp_path / "a.state"
-    path.write_text(change(small.read_text()))
+    path.write_bytes(change(small.read_text()).encode("latin-1"))
     with pytest.raises(InputFault, match=why):
         hl.run(path)
 

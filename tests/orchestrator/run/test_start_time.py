@@ -44,6 +44,18 @@ def test_a_sine_acts_as_in_fmpy_with_that_start_time(tmp_path, isolate):
     np.testing.assert_array_equal(found["fed.gained"], np.where(time < 2.5, 1.0, 3.0))
 
 
+def test_what_was_recorded_from_a_start_time_on_drives_another_run_from_there(tmp_path):
+    """To the same bits: an input over time, and a hand."""
+    hand = {"type": "profile", "table": [[2.3, 0.0, 0.0, 0.0], [2.4, 0.3, 0.1, 0.0]]}
+    options = {"start_time": 2.3, "duration": 0.1, "hand": hand}
+    own = hl.run("closed-loop-ideal", options, out=tmp_path / "own", figures=False)
+    log = {"path": str(tmp_path / "own" / "haptics.csv"), "columns": ["time", "hand.F"]}
+    fed = {"connection.+": {"from": {"table": log}, "to": "haptic_device.F_hand"}}
+    for again in ({"hand": {"type": "profile", "table": log}}, fed):
+        run = hl.run("closed-loop-ideal", options | again)
+        assert np.array_equal(own["haptic_device.x_true"], run["haptic_device.x_true"])
+
+
 @pytest.mark.parametrize("fmi", ["2", "3"])
 def test_model_exchange_has_the_bits_of_fmpy(tmp_path, fmi):
     path = equations_fmu(tmp_path, fmi)
@@ -100,13 +112,18 @@ def test_where_nothing_depends_on_time_only_the_times_differ(tmp_path, start):
         assert whole[-n:] == rest[1:]
 
 
-def test_frames_at_times_of_their_own_end_then():
+def test_frames_at_times_of_their_own_end_then(tmp_path):
+    """A trace counts from its first stamp, at which the run begins."""
     frames = [0.5, 2.03, 2.06, 2.11, 2.2]
     run = hl.run("closed-loop-ideal", HELD | {"graphics.rate": frames, "start_time": 2.0})
     found, near = run.tables["graphics"]["time"], 1 / 512
     assert found[0] == 2.0
     assert all(0 <= b - a < near for a, b in zip(frames[1:3], found[1:], strict=True))
     assert all(b > a for a, b in pairwise(found))
+    (tmp_path / "frames.csv").write_text("7.0\n7.03\n7.06\n7.11\n7.2\n")
+    trace = {"trace": str(tmp_path / "frames.csv")}
+    again = hl.run("closed-loop-ideal", HELD | {"graphics.rate": trace, "start_time": 2.0})
+    assert np.array_equal(again.tables["graphics"]["time"], found)
 
 
 @pytest.mark.parametrize("command", ["stability", "build --as-one", "run --real-time", "view"])

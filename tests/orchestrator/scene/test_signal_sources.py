@@ -94,6 +94,14 @@ def test_a_log_has_units_and_lies_beside_the_scene(tmp_path):
     assert run.run["units"]["fed_u.y"] == "N"
 
 
+def test_a_log_acts_at_the_times_that_it_has(tmp_path):
+    (tmp_path / "log.csv").write_text("t,u\n250,True\n750,false\n")
+    of = "{ table = { path = 'log.csv', units = ['ms', '1'] }, interpolation = 'hold' }"
+    file = scene(tmp_path, REAL, {"u": of}, 'values["y"] = values["u"]')
+    t = np.arange(RATE + 1) / RATE
+    assert np.array_equal(hl.run(file)["fed.y"], np.where(t < 0.75 - 1e-9, 1.0, 0.0))
+
+
 def test_a_log_that_cannot_be_read_is_told_once(tmp_path):
     (tmp_path / "log.csv").write_text("t,u\n0,1\n1,nan\n")
     file = scene(tmp_path, REAL, {"u": "{ table = { path = 'log.csv' } }"})
@@ -123,6 +131,7 @@ def test_it_is_swept_as_all_keys(tmp_path):
         ("{ formula = ['t', 't'] }", "has 2 numbers, fed.u takes 1"),
         ("{ table = [[0.0, 1.0], [0.0, 2.0]] }", "does not come after"),
         ("{ table = [] }", "the table has no rows"),
+        ("{ table = [[0.0, 1.0], [1.0]] }", "row 2 has 1 numbers, the first one 2"),
         ("{ table = [[0.0]] }", "at least one value beside its time"),
         ("{ formula = 't', units = ['N', 'N'] }", "2 `units` for 1 values"),
         ("{ formula = 't', units = ['furlong'] }", "furlong"),

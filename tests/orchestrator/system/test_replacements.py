@@ -212,6 +212,13 @@ def test_a_map_that_does_not_fit_is_refused(tmp_path, given, said, capsys):
     assert "none of its outputs" not in told
 
 
+def test_the_option_that_does_not_fit_is_told(tmp_path, capsys):
+    file = pull(tmp_path, "force0", "force1", "force2")
+    command = ["info", "closed-loop-ideal", "--swap", f"hand={file}"]
+    assert status(*command, "--map", "F=force{0,1,2}", "--map", "G=force0") == 2
+    assert """--set 'fmu.hand.map."G"=["force0"]'""" in " ".join(capsys.readouterr().err.split())
+
+
 def test_a_scene_has_map_and_connections_too(tmp_path):
     file = pull(tmp_path, "pull0", "pull1", "pull2")
     swap = {"replaces": "hand", "path": str(file), "map": {"F": ["pull0", "pull1", "pull2"]}}
