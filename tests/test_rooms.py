@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7510,
+    "components": 7515,
     "fmus": 2992,
-    "orchestrator": 16518,
+    "orchestrator": 16564,
     "programs": 1027,
-    "analysis": 9104,
+    "analysis": 9109,
     "visualization": 3857,
     "api": 645,
     "commands": 1638,

@@ -3,7 +3,9 @@
     (I - A) d = F(z) - z,   z <- z + d
 
 with the A of one point while the residual falls (linear_period.py). d is the one of least norm, in
-balanced coordinates, so that a free motion (an eigenvalue of 1) stays where it is.
+balanced coordinates, so that a free motion (an eigenvalue of 1) stays where it is. Next to a rest
+its singular value is not 0 but as small as what still moves; so what is as small as that is left
+out until the rest does: equilibria lie side by side along it, and Newton's method would go far off.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ TOLERANCE = 1e-9
 """Of each coordinate z at rest, relative to max(1, |z|)."""
 NEUTRAL = 1e-7
 """Singular values of the balanced I - A, relative to the largest, that count as 0."""
+UNRESOLVED = 1e-4
+"""Those that may be due to what still moves."""
 STEPS, POINTS = 12, 6
 """Newton steps with the slopes of one point, and points."""
 
@@ -60,5 +64,9 @@ def _residual(linear: Linearisation) -> float:
 
 def _step(linear: Linearisation) -> Vector:
     d = linear.scales
-    left = np.eye(len(d)) - linear.A * d / d[:, None]
-    return d * np.linalg.lstsq(left, linear.change / d, rcond=NEUTRAL)[0]
+    left, r = np.eye(len(d)) - linear.A * d / d[:, None], linear.change / d
+    U, s, Vt = np.linalg.svd(left)
+    r = U.T @ r
+    moves = np.linalg.norm(r[s > UNRESOLVED])
+    least = np.maximum(NEUTRAL * s.max(initial=0.0), np.minimum(moves, UNRESOLVED))
+    return d * (Vt.T @ np.divide(r, s, out=np.zeros(len(r)), where=s > least))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from tests.analysis.stability.test_virtual_coupling import HELD, POINT
 
@@ -81,3 +82,21 @@ def test_a_variant_that_differs_in_parameters_is_set_in_the_fmus_that_are_loaded
         assert variants.loads == 1
     with SceneVariants(scene) as variants:
         assert variants.judge(stiff).radius == pytest.approx(second.radius, rel=1e-9)
+
+
+@pytest.mark.parametrize("press", [(0.3, -0.1), (-0.3, -0.06)])
+def test_it_is_next_to_the_start_among_those_that_lie_side_by_side(
+    press: tuple[float, float],
+) -> None:
+    """Without topology controller a handle rests in any force that the mechanism's loop takes; next
+    to such a rest, undamped steps went off along this motion until the mechanism came apart."""
+    hand = {"type": "spring", "stiffness": [1000.0, 1000.0, 10 / 3], "damping": [5.0, 5.0, 0.01]}
+    loose = {"graphics.rate": 64, "controller.topology": False}
+    run = hl.run("closed-loop-direct", loose | {"duration": 0.05}, figures=False)
+    start = run["virtual_mechanism.x"][0]
+    target = (start + np.divide([*press, 1e-3], hand["stiffness"])).tolist()
+    options = loose | {"hand": {**hand, "target": [[0.0, *target]]}}
+    with resting("closed-loop-direct", options) as place:
+        handle = place.signal("haptic_device.x")
+    assert handle == pytest.approx(start, abs=6e-3)
+    assert handle[:2] == pytest.approx(start[:2], abs=5e-4)

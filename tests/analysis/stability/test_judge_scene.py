@@ -59,7 +59,7 @@ FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5
 SCENE = {"graphics.rate": 64, "hand": {**FIRM, "target": [[0.0, *POINT]]}}
 LEADING = 6
 COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
-    ("closed-loop-ideal", {}, (18, 85, 2426)),
+    ("closed-loop-ideal", {}, (18, 85, 2270)),
     ("closed-loop-ideal", {"hold": "foh"}, (18, 108, 5206)),
     ("serial", {}, (31, 147, 1828)),
     ("enclosure", {}, (17, 110, 1874)),
