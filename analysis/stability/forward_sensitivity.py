@@ -132,13 +132,14 @@ class ForwardSensitivity:
         self._evaluated: dict[str, tuple[Fraction, bytes]] = {}
         self._applied: dict[Key, Applied] = {}
 
-    def forget(self, fmus: Container[str]) -> None:
-        """Slopes of these FMUs hold no longer, since parameters of theirs were changed; that of
-        what they are told is the same with any."""
+    def forget(self, fmus: Container[str], connections: Container[str] = ()) -> None:
+        """Slopes of these FMUs, and of the holds of these connections, hold no longer, since
+        parameters of theirs were changed; that of what FMUs are told is the same with any."""
         for key in list(self._own):
             operation = key[0]
             own = isinstance(operation, OfFmu) and operation.fmu in fmus
-            if (own and not isinstance(operation, Set)) or isinstance(operation, Repeat):
+            held = isinstance(operation, OfHold) and operation.connection in connections
+            if (own and not isinstance(operation, Set)) or held or isinstance(operation, Repeat):
                 del self._own[key]
 
     def begin(self) -> None:

@@ -237,7 +237,22 @@ class LiftedMap:
         for fmu, scalar, value in values:
             self._simulation.instances[fmu].connect([scalar], [0])(np.array([float(value)]))
         self._template = self._state.save()
-        self._sensitivity.forget({fmu for fmu, _, _ in values})
+        self._sensitivity.forget({fmu for fmu, _, _ in values}, {*self._set_held_gains(values)})
+
+    def _set_held_gains(self, values: Sequence[tuple[str, Scalar, float]]) -> Iterator[str]:
+        """Sets the gains of the spring-dampers that holds know of these FMUs, and gives the
+        connections of these holds."""
+        found = {(fmu, scalar.name): value for fmu, scalar, value in values}
+        for c in self.system.connections:
+            gains = self._simulation.holds[c.name].parts.gains if c.needs == "coupling" else None
+            unit = self.system.fmu[c.source].description
+            for spring in unit.springs if gains else ():
+                if spring.force != c.source_port:
+                    continue
+                for name, own in zip((spring.stiffness, spring.damping), gains or (), strict=True):
+                    for i, s in enumerate(unit.port(name, "parameter") if name else ()):
+                        own[i] = found.get((c.source, s.name), own[i])
+                yield c.name
 
     def directions(self, point: Vector) -> Iterator[Vector]:
         """Orthonormal directions in which the state can be moved from `point`, that of the
