@@ -45,7 +45,7 @@ imports. A number is raised only in a commit that says why."""
 CAPABILITIES = {
     "network": (("orchestrator", "network"), 14),
     "engine": (("fmus", "engine"), 16),
-    "spring": (("components",), 47),
+    "spring": (("components",), 48),
     "program": (("programs",), 6),
 }
 """Words of a capability: where it lives, and the most files outside of it that name it."""
