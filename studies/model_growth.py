@@ -70,6 +70,8 @@ class Cell:
     hand: float
     late: float = 0.0
     off: float = OFF
+    turned: float = 0.0
+    """From the start to the hand's target, in angle (rad)."""
     stiffer: float = 1.0
     """The factor on the stiffnesses of the controller, dampings by its root."""
 
@@ -100,7 +102,7 @@ class Cell:
                 "type": "spring",
                 "stiffness": [k, k, k / 500],
                 "damping": [k / 50, k / 50, k / 20000],
-                "target": [[0.0, x + self.off, y - self.off, angle]],
+                "target": [[0.0, x + self.off, y - self.off, angle + self.turned]],
             },
         }
 
@@ -137,7 +139,13 @@ def of_map(cell: Cell) -> tuple[float, float]:
 
 
 def of_run(cell: Cell, P: float) -> float:
-    """The growth rate (1/s) of a run, in periods of P (s)."""
+    """The growth rate (1/s) in periods of P (s), the larger one of two runs: straight motions alone
+    may leave out a mode of turning, and both together hide one that grows at nearly the rate of
+    another."""
+    return max(_of_one_run(cell, P), _of_one_run(replace(cell, turned=OFF), P))
+
+
+def _of_one_run(cell: Cell, P: float) -> float:
     r = hl.run(cell.scene, cell.options | {"duration": SECONDS}, figures=False)
     v = r["haptic_device.v"][1:]
     steps = round(P * 512)

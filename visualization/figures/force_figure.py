@@ -54,16 +54,17 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     ]
     if loads:
         title += f"; motors reach {short(100 * max(loads))} % of their torque limit"
-    figure, axes = titled_axes(results, title, "time (s)", *labels)
+    figure, _ = titled_axes(results, title, "time (s)", *labels)
+    axes = figure.axes
     styles = dict(zip([user.name for user in find_users(results)], cycle(STYLES)))
     names = [*WRENCHES.values()]
     for name, (time, *force_and_moment) in drawn.items():
         user, _, kind = name.rpartition(": ")
         look = {"lw": 1, "color": CURVES[names.index(kind)], "ls": styles[user]}
-        for each, values in zip(axes[:of_wrenches], force_and_moment, strict=False):
-            each.plot(time, values, label=name, **look)
-    for each in axes[:of_wrenches]:
-        legend_above_curves(each, columns=2)
+        for panel, values in zip(axes[:of_wrenches], force_and_moment, strict=False):
+            panel.plot(time, values, label=name, **look)
+    for panel in axes[:of_wrenches]:
+        legend_above_curves(panel, columns=2)
     for user, (time, *tau) in driven.items():
         for i, each in enumerate(tau):
             label = None if user else f"motor {i + 1}"
