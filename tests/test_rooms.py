@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16564,
     "programs": 1027,
     "analysis": 9122,
-    "visualization": 3857,
+    "visualization": 3858,
     "api": 645,
     "commands": 1638,
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from itertools import cycle
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings.forces import (
     WRENCHES,
@@ -60,7 +60,7 @@ def forces(results: Results, devices: Mapping[str, Device]) -> Figure:
     names = [*WRENCHES.values()]
     for name, (time, *force_and_moment) in drawn.items():
         user, _, kind = name.rpartition(": ")
-        look = {"lw": 1, "color": CURVES[names.index(kind)], "ls": styles[user]}
+        look: dict[str, Any] = {"lw": 1, "color": CURVES[names.index(kind)], "ls": styles[user]}
         for panel, values in zip(axes[:of_wrenches], force_and_moment, strict=False):
             panel.plot(time, values, label=name, **look)
     for panel in axes[:of_wrenches]:
