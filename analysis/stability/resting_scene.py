@@ -39,8 +39,9 @@ SURE = 0.01
 
 
 def contact_force(linkage: Linkage, F_env: Matrix, gap: Vector | None) -> Matrix:
-    """F_env (k, 3) where a body touches something, by the least `gap` (k,), or a joint is at its
-    limit. F_env alone does not tell: it has other hands and efforts on joints, too."""
+    """F_env (k, 3) where a body touches something, by the least `gap` (k,), 0 elsewhere: F_env has
+    other hands and efforts on joints, too. All of it counts where a joint has limits, since nothing
+    tells whether it is at one."""
     limited = any(j.limits for j in linkage.joint) or any(j.limits for j in linkage.loop)
     touches = np.zeros(len(F_env), bool) if gap is None else gap < 0.0
     return np.where((touches | limited)[:, None], F_env, 0.0)
