@@ -239,7 +239,9 @@ class ModelExchange(WithEvents):
             self._begins = True
             self._counts["events"] += 1
             if self.description.states is not None and self._counted:
-                raise self._fault("has an event where it is linearised, behind which nothing is", time)
+                raise self._fault(
+                    "has an event where it is linearised, behind which nothing is", time
+                )
             if super().event(time, active, settings):
                 return True
             active, settings = (), lambda: None

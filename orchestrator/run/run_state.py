@@ -23,7 +23,7 @@ from hapticlink.orchestrator.fmi.description import SERIALISED
 from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
-from hapticlink.orchestrator.results.state_file import read_state, write_state
+from hapticlink.orchestrator.results.state_file import expect_state, read_state, write_state
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, array
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
@@ -51,10 +51,12 @@ class RunState:
 def read(path: Path) -> RunState:
     """Raises InputFault where a file is no state, or was made by another version."""
     content = read_state(path)
-    if content["layout"] != _layout():
+    with expect_state(path):
+        layout, version, _ = content["layout"], content["version"], float(content["time"])
+    if layout != _layout():
         raise InputFault(
-            f"{path}: made by another version of hapticlink ({content['version']}), whose states "
-            "have other contents: save it again with this one"
+            f"{path}: made by another version of hapticlink ({version}), whose states have other "
+            "contents: save it again with this one"
         )
     return RunState(path.absolute(), content)
 
@@ -270,6 +272,11 @@ def require_plain_holds(simulation: Simulation) -> None:
 
 def restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> None:
     """Puts a run that was started, and whose system fits, into the state."""
+    with expect_state(state.path):
+        _restore(state, simulation, loop)
+
+
+def _restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> None:
     saved, system, signals = state.content, simulation.system, simulation.signals
     newer = {c.name for c in with_other_holds(state, system)}
     for u in system.fmus:
