@@ -3,8 +3,11 @@ that the far sides of springs have put in."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -65,6 +68,14 @@ class SignalVector:
             held = self.hold(connection.name)
             return list(range(held.start, held.stop))
         return self.sources(connection)
+
+    def texts(self, recorded: Mapping[str, int] | None) -> dict[int, str]:
+        """By the places in a row of those recorded columns that are texts, their FMI types."""
+        types = {
+            f"{u.name}.{s.name}": s.type for u in self.system.fmus for s in u.description.outputs
+        }
+        columns = enumerate(recorded or (), 1)
+        return {place: types[name] for place, name in columns if types[name] in WRITTEN}
 
     def recorded(self, clock: str) -> dict[str, int] | None:
         """The columns `fmu.variable` of a clock's table with their indices, None where it has no

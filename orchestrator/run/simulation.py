@@ -163,6 +163,7 @@ class Simulation(LoadedFmus):
             recorder = self._results.recorder(
                 clock.name, recorded, values, every, end, most, before
             )
+            recorder.texts = self.signals.texts(recorded)
             self.recorders[clock.name] = self._stack.enter_context(recorder)
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:

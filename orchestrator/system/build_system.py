@@ -40,7 +40,7 @@ from hapticlink.orchestrator.system import (
     timed_events,
 )
 from hapticlink.orchestrator.system.assign_holds import assign, find_energy_ports
-from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
+from hapticlink.orchestrator.system.connections import check_partial_vectors, connect
 from hapticlink.orchestrator.system.fmu_files import fmu_files
 from hapticlink.orchestrator.system.outputs_to_record import choose_outputs, read_recorded
 from hapticlink.orchestrator.system.start_values import separate_start_values
@@ -187,7 +187,7 @@ def _assemble(
     fmus = tuple(with_sizes(u, time) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
-    fmus = tuple(read_recorded(with_texts(u, connections), scene.record) for u in fmus)
+    fmus = tuple(read_recorded(u, scene.record, connections) for u in fmus)
     if len(tables) < len(scene.fmu):  # what names an FMU that cannot be read may be right
         raise _faults(scene, problems)
     energy = find_energy_ports(scene, fmus, connections)
