@@ -67,7 +67,7 @@ class RunSetup:
     seeds: dict[str, int]
     files: list[str]
     rates: list[str]
-    """The names of the clocks."""
+    """The names of the clocks, each with those of its tables of fewer rows."""
     clocks: dict[str, ClockSteps]
     stop_when: str
     base: str

@@ -42,7 +42,11 @@ from hapticlink.orchestrator.system import (
 from hapticlink.orchestrator.system.assign_holds import assign, find_energy_ports
 from hapticlink.orchestrator.system.connections import check_partial_vectors, connect
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.outputs_to_record import choose_outputs, read_recorded
+from hapticlink.orchestrator.system.outputs_to_record import (
+    choose_outputs,
+    choose_slower,
+    read_recorded,
+)
 from hapticlink.orchestrator.system.start_values import separate_start_values
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
@@ -212,6 +216,7 @@ def _assemble(
     problems += replacements.check_replacements(scene, replaced, rows, system)
     changes = (*_coupling_ramps(scene, system), *timed_events.changes(scene, system, problems))
     written = choose_outputs(scene.record, system, problems)
+    slower = choose_slower(scene.record, system, problems)
     if problems:
         raise _faults(scene, problems)
     mapped = {
@@ -220,7 +225,7 @@ def _assemble(
     }
     return replace(
         system,
-        recording=Recording(written, scene.record.every),
+        recording=Recording(written, scene.record.every, slower),
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )

@@ -3,16 +3,19 @@ outputs are."""
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 
 from hapticlink.orchestrator.base.errors import near
+from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.scene_tables import RecordTable
 from hapticlink.orchestrator.scene.toml_keys import Problem
 from hapticlink.orchestrator.system.connections import with_texts
-from hapticlink.orchestrator.system.system import Connection, Fmu, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, SlowerTable, System
 
 ANYTHING = "*"
 
@@ -67,10 +70,54 @@ def choose_outputs(
         chosen = {name for name in known if any(_fits(asked, [name]) for asked in record.signals)}
         problems += [
             (("record", "signals", i), _why_nothing(name, system, known))
-            for i, name in enumerate(record.signals)
+            for i, name in _places(record.signals)
             if not _fits(name, known)
         ]
     return tuple(name for name, names in called.items() if names & chosen)
+
+
+def choose_slower(
+    record: RecordTable, system: System, problems: list[Problem]
+) -> dict[str, SlowerTable]:
+    """The tables, `<clock>_<rate>hz`, of outputs with a rate of rows below that of their clock;
+    those with a higher one have its. Adds a problem for each that is no whole part of the
+    clock's."""
+    tables: dict[str, SlowerTable] = {}
+    told = set[tuple[str, str]]()
+    asked = record.signals if isinstance(record.signals, Mapping) else {}
+    for fmu in system.fmus:
+        clock = system.timeline.clock(fmu.clock)
+        for s in fmu.description.outputs if asked else ():
+            names = (fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}")
+            pattern = next((p for p in asked if _fits(p, names[s.causality != "output" :])), None)
+            if pattern is None or (pattern, clock.name) in told:
+                continue
+            rate = exact(asked[pattern])
+            own = 1 / (clock.period * system.timeline.base) if clock.period else None
+            if own is None or (own > rate and own % rate):
+                told.add((pattern, clock.name))
+                why = _why_not_at(rate, clock.name, own)
+                problems.append((("record", "signals", pattern), why))
+            elif own > rate:
+                table = f"{clock.name}_{float(rate):g}hz"
+                others = tables[table].outputs if table in tables else frozenset[str]()
+                outputs = others | {f"{fmu.name}.{s.name}"}
+                tables[table] = SlowerTable(clock.name, int(own / rate), outputs)
+    return tables
+
+
+def _why_not_at(rate: Fraction, clock: str, own: Fraction | None) -> str:
+    if own is None:
+        return f"the rate of {clock} varies, of which {float(rate):g} Hz is no part: take `every`"
+    less, more = (float(own / n) for n in (math.ceil(own / rate), own // rate))
+    return (
+        f"{float(rate):g} Hz is no whole part of the {float(own):g} Hz of {clock}, at whose "
+        f"communication points rows are: take {less:.6g} or {more:.6g}"
+    )
+
+
+def _places(asked: Sequence[str] | Mapping[str, float]) -> Iterable[tuple[int | str, str]]:
+    return zip(asked, asked, strict=True) if isinstance(asked, Mapping) else enumerate(asked)
 
 
 def _why_nothing(name: str, system: System, known: Sequence[str]) -> str:
