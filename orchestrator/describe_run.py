@@ -32,7 +32,7 @@ PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
 
 def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[str]) -> RunSetup:
     """The record of a run that has not begun. tables: names of its tables, without their ending;
-    not_recorded: outputs of which an entry is not written."""
+    not_recorded: outputs of which an entry is not written in the rows of its rate."""
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
     end = timeline.time(timeline.end)

@@ -69,7 +69,7 @@ class Table(Mapping[str, Vector]):
         if not self.texts.keys() & {*np.ravel(places)}:
             return found
         each = zip(np.ravel(places), found.T.reshape(-1, len(self.rows)), strict=True)
-        words = [np.array([self.texts[at][int(n)] for n in row], str) for at, row in each]
+        words = [np.array([self.texts[int(at)][int(n)] for n in row], np.str_) for at, row in each]
         return np.stack(words, axis=-1).reshape(found.shape)
 
     def _read_numbers(self, places: int | Sequence[int]) -> Vector:
@@ -320,7 +320,8 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
 def _read_texts(lines: Iterator[str]) -> tuple[Vector, dict[int, dict[int, str]]]:
     """The numbers of rows in which texts are in quotes, each text counted as it comes."""
     numbers: dict[int, dict[str, int]] = {}
-    rows = []
+    rows = list[list[Any]]()
+    cells: list[Any]
     for cells in csv.reader(lines, quoting=csv.QUOTE_NONNUMERIC, strict=True):
         for place, cell in enumerate(cells):
             if isinstance(cell, str):

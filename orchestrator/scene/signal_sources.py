@@ -108,11 +108,11 @@ def _read_texts(source: Mapping[str, Any]) -> list[list[Any]] | None:
     """The rows (time, texts) of a table of texts; None of other signals. Raises as
     `read_recorded_table` does, and ValueError for an interpolation that texts do not have."""
     table = source.get("table")
+    rows: list[list[Any]] | None = None
     if isinstance(table, dict) and "path" in table:
         rows = read_recorded_texts(table)
-    else:
-        is_text = isinstance(table, list) and any(isinstance(x, str) for r in table for x in r[1:])
-        rows = table if is_text else None
+    elif isinstance(table, list) and all(isinstance(row, list) for row in table):
+        rows = table if any(isinstance(x, str) for row in table for x in row[1:]) else None
     if rows is None:
         return None
     if (how := source.get("interpolation", "hold")) != "hold":
