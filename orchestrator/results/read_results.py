@@ -66,11 +66,12 @@ class Table(Mapping[str, Vector]):
     def _read(self, places: int | Sequence[int]) -> Vector:
         """Columns; of a file copies, which take less memory than the rows that are mapped."""
         found = self._read_numbers(places)
-        if not self.texts.keys() & {*np.ravel(places)}:
+        if not (self.texts and self.texts.keys() & {*np.ravel(places)}):
             return found
         each = zip(np.ravel(places), found.T.reshape(-1, len(self.rows)), strict=True)
         words = [np.array([self.texts[int(at)][int(n)] for n in row], np.str_) for at, row in each]
-        return np.stack(words, axis=-1).reshape(found.shape)
+        read: Any = np.stack(words, axis=-1).reshape(found.shape)
+        return read  # a vector of numbers, but for texts
 
     def _read_numbers(self, places: int | Sequence[int]) -> Vector:
         if not isinstance(self.rows, RowsFile):
@@ -173,12 +174,7 @@ class Results:
         """Whether both recorded the same signals with the same numbers."""
         pairs = ((self.tables[n], other.tables[n]) for n in self.tables if n in other.tables)
         return [*self.tables] == [*other.tables] and all(
-            mine.columns == its.columns
-            and all(
-                np.array_equal(mine[c], its[c], equal_nan=mine[c].dtype == float)
-                for c in mine.columns
-            )
-            for mine, its in pairs
+            mine.columns == its.columns and _are_equal(mine, its) for mine, its in pairs
         )
 
     @cached_property
@@ -196,6 +192,14 @@ class Results:
     def graphics(self) -> Table:
         """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
+
+
+def _are_equal(mine: Table, its: Table) -> bool:
+    """Whether tables of the same columns have the same rows."""
+    if not (mine.texts or its.texts):
+        return np.array_equal(mine.rows, its.rows, equal_nan=True)
+    pairs = ((mine[column], its[column]) for column in mine.columns)
+    return all(np.array_equal(a, b, equal_nan=a.dtype == float) for a, b in pairs)
 
 
 def with_record(results: Results, record: RunRecord) -> Results:
@@ -320,14 +324,14 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
 def _read_texts(lines: Iterator[str]) -> tuple[Vector, dict[int, dict[int, str]]]:
     """The numbers of rows in which texts are in quotes, each text counted as it comes."""
     numbers: dict[int, dict[str, int]] = {}
-    rows = list[list[Any]]()
-    cells: list[Any]
+    rows = []
     for cells in csv.reader(lines, quoting=csv.QUOTE_NONNUMERIC, strict=True):
+        row: list[Any] = cells
         for place, cell in enumerate(cells):
             if isinstance(cell, str):
                 known = numbers.setdefault(place, {})
-                cells[place] = known.setdefault(cell, len(known))
-        rows.append(cells)
+                row[place] = known.setdefault(cell, len(known))
+        rows.append(row)
     texts = {place: {n: word for word, n in known.items()} for place, known in numbers.items()}
     return np.array(rows, np.float64), texts
 
