@@ -172,7 +172,7 @@ def _identified(
     def stand_in(*arguments: Any) -> Instance:
         return LinearInstance(response, inputs, once[0], *arguments)
 
-    return replace(fmu, description=described, isolate=False, stand_in=stand_in)
+    return replace(fmu, description=described, isolate=False, in_its_place=stand_in)
 
 
 def _inputs_in(run: Results, connections: Iterable[Connection], T: float) -> Matrix | None:

@@ -261,7 +261,8 @@ def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
     most = driver.torque_limit or scene.all_devices[user].torque_limit
     rate = driver.torque_rate or most / TORQUE_RISE
     driver = replace(driver, torque_limit=most, torque_rate=rate)
-    return replace(fmu, description=describe_board(fmu.description), hardware=True, driver=driver)
+    about = describe_board(fmu.description)
+    return replace(fmu, description=about, hardware=True, in_its_place=driver)
 
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:

@@ -44,12 +44,18 @@ class Fmu:
     isolate: bool = False
     hardware: bool = False
     recorded_only: frozenset[str] = frozenset()
-    served: ServedAt | None = None
-    """Where it runs, if that is on another computer."""
-    driver: Driver | None = None
-    """The board in its place."""
-    stand_in: Callable[..., Any] | None = None
-    """What makes the `Instance` that runs in its place, by the arguments of one."""
+    in_its_place: ServedAt | Driver | Callable[..., Any] | None = None
+    """What runs instead: the FMU on another computer, a board, or what this makes by the arguments
+    of an `Instance`."""
+
+    @property
+    def served(self) -> ServedAt | None:
+        return at if isinstance(at := self.in_its_place, ServedAt) else None
+
+    @property
+    def driver(self) -> Driver | None:
+        """Of the board in its place."""
+        return at if isinstance(at := self.in_its_place, Driver) else None
 
     @property
     def sampled(self) -> bool:
