@@ -5,17 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.components.specs.device import Device, DeviceBody
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, near, shorten, unknown
-from hapticlink.orchestrator.scene.find_scene import list_shipped
+from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.merge import merge
 from hapticlink.orchestrator.scene.toml_keys import (
-    LARGEST,
     Path,
     Place,
     Problem,
@@ -44,28 +42,6 @@ class DeviceBodyTable(DeviceBody):
 
     like: str | None = None
     """The body whose mass, inertia and centre it has, where it does not say otherwise."""
-
-
-def list_devices() -> dict[str, Any]:
-    """The device files that are shipped with the package, by name."""
-    return list_shipped("hapticlink.scenes.devices")
-
-
-@cache
-def _read_shipped(name: str) -> str:
-    text: str = list_devices()[name].read_text(encoding="utf-8")
-    return text
-
-
-def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
-    """Name, text and folder of a device file: a path relative to `folder`, or the name of a shipped
-    one, which has no folder. Raises InputFault where there is none."""
-    path, known = (folder or FilePath()) / name, list_devices()
-    if text_files.exists(path):
-        return str(path), text_files.read_text(path, "a device", LARGEST), path.parent
-    if name in known:
-        return name, _read_shipped(name), None
-    raise InputFault(f"{shorten(name)}: neither a file nor a shipped device; {near(name, known)}")
 
 
 def device_tables(data: Mapping[str, Any]) -> Iterator[tuple[Path, dict[str, Any]]]:
@@ -169,7 +145,8 @@ def _read(
         raise InputFault(f"{shorten(repr(name))}: write a device's name or path")
     if depth >= MAX_EXTENDED:
         raise InputFault(f"{shorten(name)}: the last of {MAX_EXTENDED} files, each over the next")
-    file, text, where = find_device(name, folder)
+    _, text, where = find_scene(name, folder, "device")
+    file = str(where / FilePath(name).name) if where else name
     try:
         tables, own = read_document(text)
     except ValueError as error:
