@@ -242,10 +242,10 @@ class Instance(ABC):
         """A function that sets `scalars` to the values at the indices `places` of a signal
         vector."""
 
-    @abstractmethod
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         """The Jacobian (outputs, inputs) at the current state, by directional derivatives; None if
         the FMU does not provide them."""
+        return None
 
     @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
@@ -270,9 +270,8 @@ class Instance(ABC):
     def step(self, time: float, end: float, size: float) -> None:
         """Begin a doStep from `time` over `size`, to `end` (s)."""
 
-    @abstractmethod
-    def finish(self) -> None:
-        """Wait until the step has been taken."""
+    def finish(self) -> None:  # noqa: B027
+        """Wait until the step has been taken, where `step` has only begun it."""
 
     @abstractmethod
     def save(self, slot: int = 0) -> None:
@@ -290,18 +289,16 @@ class Instance(ABC):
     def deserialize(self, state: bytes) -> None:
         """Restore an FMU state from bytes that `serialized` gave, or that were made of them."""
 
-    @abstractmethod
-    def dismiss(self) -> None:
-        """Start closing without waiting for it."""
+    def dismiss(self) -> None:  # noqa: B027
+        """Start closing without waiting for it, where it takes long."""
 
-    @abstractmethod
-    def abandon(self) -> None:
+    def abandon(self) -> None:  # noqa: B027
         """The instance is in a call that does not return: it is not called again."""
 
-    @abstractmethod
     def close(self) -> FmuFault | None:
         """Terminate if FMI allows it in the current state, free, unload, and remove the folder.
         Returns the fault of an FMU that fails in this."""
+        return None
 
     def _convert(self, places: Sequence[int] | slice = slice(None)) -> None:
         """Convert outputs that were just read."""
