@@ -17,7 +17,9 @@ from hapticlink.orchestrator.scene.toml_keys import (
     Path,
     Place,
     Problem,
+    entries,
     read_document,
+    tables_of_users,
     value,
 )
 
@@ -46,17 +48,10 @@ class DeviceBodyTable(DeviceBody):
 
 def device_tables(data: Mapping[str, Any]) -> Iterator[tuple[Path, dict[str, Any]]]:
     """The tables of all devices of a scene, with their paths."""
-    if isinstance(data.get("device"), dict):
-        yield ("device",), data["device"]
-    further = data.get("devices")
-    for name, table in further.items() if isinstance(further, dict) else ():
+    paths: list[Path] = [("fmu", i, "settings", "device") for i in range(len(entries(data, "fmu")))]
+    for path, table in (*tables_of_users(data, "device"), *((p, value(data, p)) for p in paths)):
         if isinstance(table, dict):
-            yield ("devices", name), table
-    fmus = data.get("fmu")
-    for i, fmu in enumerate(fmus if isinstance(fmus, list) else ()):
-        table = value(fmu, ("settings", "device"))
-        if isinstance(table, dict):
-            yield ("fmu", i, "settings", "device"), table
+            yield path, table
 
 
 def is_choice(names: tuple[str, ...]) -> bool:
@@ -103,8 +98,8 @@ def put_device_files(data: Mapping[str, Any], written: Mapping[Path, Place]) -> 
             for key, place in where.items()
             if not (replaced and any(key[:i] in replaced for i in range(1, len(key) + 1)))
         }
-        for key, entries in named.items():
-            for entry, changes in entries.items():
+        for key, changed in named.items():
+            for entry, changes in changed.items():
                 index = _index(whole.get(key), entry)
                 if index is None or not isinstance(changes, dict):
                     known = [str(e.get("name")) for e in whole.get(key, ())]
@@ -164,10 +159,9 @@ def put_likes(data: Mapping[str, Any]) -> list[Problem]:
     with the names."""
     problems: list[Problem] = []
     for path, table in device_tables(data):
-        bodies = table.get("body")
-        entries = [b for b in bodies if isinstance(b, dict)] if isinstance(bodies, list) else []
-        own = {b["name"]: b for b in entries if isinstance(b.get("name"), str) and "like" not in b}
-        for i, body in enumerate(entries):
+        bodies = [b for b in entries(table, "body") if isinstance(b, dict)]
+        own = {b["name"]: b for b in bodies if isinstance(b.get("name"), str) and "like" not in b}
+        for i, body in enumerate(bodies):
             if "like" not in body:
                 continue
             model = body.pop("like")
