@@ -30,6 +30,7 @@ from hapticlink.analysis.findings.tracking import (
     compared_directions,
     find_users,
     have_one_shape,
+    newest,
     of_any_shape,
     of_block,
     of_port,
@@ -216,11 +217,11 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     inertia_of_handle = next(inertias, None)
     if inertia_of_handle is None:
         return None
-    times, mobility = held["time"], held[MOBILITIES[0]]
+    mobility = held[MOBILITIES[0]]
     signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]
 
     def added(time: Vector, own: Vector, inertia: Vector, hand: Vector, *others: Vector) -> Vector:
-        change = mobility[np.searchsorted(times, time + 1e-12, "right") - 1] - own
+        change = mobility[newest(held, time)] - own
         wrench = sum(others, start=hand)
         force: Vector = np.einsum("kij,kjl,kl->ki", inertia, change, wrench)
         return force.T

@@ -136,7 +136,7 @@ def _component(elements: Element, unit: Fmu, version: str) -> Element:
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
         set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version=version, name="start")
         parameters = SubElement(set_, f"{{{SSV}}}Parameters")
-    given = {scalar.name: value for scalar, value in unit.starts}
+    given = unit.start_values
     started = {n: e for n, e in variables.items() if any(s.name in given for s in e)}
     for name, entries in started.items():
         text = " ".join(_text(s, given.get(s.name, s.start)) for s in entries)

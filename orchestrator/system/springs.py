@@ -43,7 +43,7 @@ def find_declared_springs(
 
 
 def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
-    given = {scalar.name: value for scalar, value in fmu.starts}
+    given = fmu.start_values
     entries = fmu.description.port(parameter, "parameter")
     return tuple(float(given.get(s.name, s.start)) for s in entries)
 

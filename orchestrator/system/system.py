@@ -66,6 +66,11 @@ class Fmu:
         """Whether its outputs describe the beginning of the step at whose end they are known."""
         return self.description.timing == "frame"
 
+    @property
+    def start_values(self) -> dict[str, Any]:
+        """Its start values by name of the variable."""
+        return {scalar.name: value for scalar, value in self.starts}
+
     def starting(self, new: Starts) -> Fmu:
         """The FMU with `new` start values, in place of those that these variables have."""
         names = {scalar.name for scalar, _ in new}
