@@ -17,6 +17,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Literal
 
 import casadi as ca
@@ -237,9 +238,9 @@ class Block:
         description: str,
         timing: Timing,
         *,
-        initial: Mapping[str, ca.SX],
-        step: Mapping[str, ca.SX] | ca.SX,
         output: Mapping[str, ca.SX],
+        initial: Mapping[str, ca.SX] = MappingProxyType({}),
+        step: Mapping[str, ca.SX] | ca.SX = MappingProxyType({}),
         substeps: int = 1,
         memory: Collection[str] = (),
         documentation: str = "",

@@ -36,13 +36,13 @@ def states(model: DeviceModel) -> tuple[Variable, ...]:
     if model.device.observer.law == "nicosia":
         return (
             variables.place(model, "x_measured", "pose from the encoders"),
-            variables.way(model, "x_observer", "observer state x1"),
-            variables.rate(model, "v_observer", "observer state x2"),
+            variables.felt(model, "pose", "x_observer", "observer state x1"),
+            variables.felt(model, "twist", "v_observer", "observer state x2"),
         )
     return (
         variables.place(model, "x_observer", "estimated pose"),
-        variables.rate(model, "v_observer", "estimated velocity"),
-        variables.force(model, "F_observer", "estimated wrench of the hand"),
+        variables.felt(model, "twist", "v_observer", "estimated velocity"),
+        variables.felt(model, "wrench", "F_observer", "estimated wrench of the hand"),
     )
 
 
