@@ -27,9 +27,6 @@ from hapticlink.components.schematic_parts import BlockPart, require_complete
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled", "frame"]
-STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
-"""Parameters that a run sets, where a block has them: the longest communication step (s) of the
-block, and of the graphics copy. No block is built for a step size."""
 Variability = Literal["fixed", "tunable"]
 
 

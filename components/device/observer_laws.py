@@ -9,12 +9,13 @@ from typing import Any, Protocol
 
 import casadi as ca
 
-from hapticlink.components.component import STEP_SIZE, Signals, Variable
+from hapticlink.components.component import Signals, Variable
 from hapticlink.components.device import variables
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.kalman_observer import NOMINAL, KalmanObserver, bandwidth
 from hapticlink.components.device.motors_and_encoders import mass_and_count
 from hapticlink.components.device.observer import HandleObserver
+from hapticlink.components.ports import STEP_SIZE
 
 BY_A_COUNT, FASTEST = 0.11, 300.0
 """Error of the force (N) by a count from which the default bandwidth of nicosia follows, and the
