@@ -36,8 +36,8 @@ def advise(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
 
-    folder = folders.ensure(output.out or changes.folder("advice", scene))
     processes = count_processes(jobs)
+    folder = folders.ensure(output.out or changes.folder("advice", scene))
     with progress.runs(f"{title(scene)}: methods on it and around it", output.quiet) as tell:
         advice = find(scene, changes.options, folder, processes=processes, seed=seed, tell=tell)
     write_json(folder / "advice.json", advice.record())
