@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7492,
     "fmus": 2991,
-    "orchestrator": 16557,
+    "orchestrator": 16556,
     "programs": 1027,
     "analysis": 9113,
     "visualization": 3848,

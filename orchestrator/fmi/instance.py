@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.fmi.units import factors_and_offsets
 from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
@@ -154,12 +154,8 @@ class Instance(ABC):
         self.row_due = ctypes.c_int64(1)
         self._counted = False
         self.bounds = OutputBounds(description, outputs)
-        conversions = [s.conversion for s in description.outputs]
-        self.converted: Matrix | None = None
-        """Factors and offsets of its outputs, where these are in other units than their FMU's."""
-        if any(c != SAME for c in conversions):
-            self.converted = np.array([[c.factor for c in conversions],
-                                       [c.offset for c in conversions]])  # fmt: skip
+        self.converted = factors_and_offsets([s.conversion for s in description.outputs])
+        """Of its outputs, where these are in other units than their FMU's."""
         self._folder = folder
 
     def __enter__(self) -> Instance:
@@ -303,7 +299,7 @@ class Instance(ABC):
     def _convert(self, places: Sequence[int] | slice = slice(None)) -> None:
         """Convert outputs that were just read."""
         if self.converted is not None:
-            factors, offsets = self.converted[:, places]
+            factors, offsets = (each[places] for each in self.converted)
             self.outputs[places] = factors * self.outputs[places] + offsets
 
     def _logged(self) -> Sequence[str]:
