@@ -103,7 +103,7 @@ def tolerated_energy(hand_work: float) -> float:
 
 
 def allowance(hand_work: float, whose: str = "the hand") -> str:
-    """What is `allowed`, in words, for `whose` work."""
+    """What is tolerated, in words, for `whose` work."""
     most = f"{short(1e3 * tolerated_energy(hand_work))} mJ"
     if SHARE * hand_work < NOTICEABLE_J:
         return f"{most}, the least that a hand notices"
@@ -122,7 +122,7 @@ def hand_work(results: Results) -> float:
 
 
 def tolerated_in_run(results: Results) -> float:
-    """What is `allowed` (J) in a run."""
+    """What is tolerated (J) in a run."""
     return tolerated_energy(hand_work(results))
 
 

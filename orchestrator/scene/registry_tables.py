@@ -93,7 +93,7 @@ def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
 
 
 def put_registry_tables(scene: Scene, records: Mapping[Path, Any]) -> Scene:
-    """The scene with such tables replaced by the records that `read` returned."""
+    """The scene with such tables replaced by the records that `read_registry_tables` gave."""
 
     def settings(i: int) -> dict[str, Any]:
         record = records["fmu", i, "settings"]
