@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from hapticlink.analysis.maps.z_width import compute_z_width
 from hapticlink.analysis.sweep.grid import Vary, axes
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.process import count_processes
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.overrides import Options
@@ -43,7 +43,7 @@ def stability_map(
 
     if check < 0:
         raise InputFault(f"--check {check}: give 0 or more")
-    processes, folder = _processes(jobs), folders.ensure(out)
+    processes, folder = count_processes(jobs), folders.ensure(out)
     tell = progress or (lambda done, of: None)
     given = overrides.write_options(options)
     found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
@@ -76,7 +76,7 @@ def z_width(
     """
     from hapticlink.visualization.figures import z_width_figure as drawing
 
-    processes, folder = _processes(jobs), folders.ensure(out)
+    processes, folder = count_processes(jobs), folders.ensure(out)
     tell = progress or (lambda done, of: None)
     over = axes(vary)
     rows = compute_z_width(
@@ -84,9 +84,3 @@ def z_width(
     )
     figure_files.save({"z-width": drawing.draw(rows, largest.partition("=")[0], over)}, folder)
     return rows
-
-
-def _processes(jobs: int | None) -> int:
-    if jobs is not None and jobs < 1:
-        raise InputFault(f"--jobs {jobs}: give 1 or more")
-    return jobs or os.cpu_count() or 1

@@ -26,7 +26,7 @@ from hapticlink.orchestrator.results.read_results import read_into_memory, witho
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, read_save_times
-from hapticlink.orchestrator.scene.overrides import Options
+from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_files
 
@@ -39,9 +39,11 @@ class RunInterrupted(Interrupted):
         self.run = run
 
 
-def with_board(port: str) -> dict[str, Any]:
+def with_board(port: str | None) -> dict[str, Any]:
     """The options that put the board at a port in the place of a scene's device: it has encoders,
-    and the observer is beside it."""
+    and the observer is beside it; none where there is no port."""
+    if port is None:
+        return {}
     return {"device.driver.port": port, "device.observer.beside": True, "sensing": "encoders"}
 
 
@@ -100,9 +102,8 @@ def run(
     is, and Ctrl-C ends the runs of the main thread.
     """
     drawn = figure_files.formats(format) if figures else ()
-    read = open_scene.load(scene, options, takes=open_scene.BEGINNINGS)
-    if device is not None:
-        read = open_scene.load(read, with_board(device))
+    options = (*write_options(options), *write_options(with_board(device)))
+    read = open_scene.load(scene, options, takes=() if device else open_scene.BEGINNINGS)
     if real_time:
         from hapticlink.api.board_start import start_at_handle  # slow to load
 

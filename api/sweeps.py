@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,6 +17,7 @@ from hapticlink.analysis.sweep.run_sweep import sweep as make
 from hapticlink.api.result import frame
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault, unknown
+from hapticlink.orchestrator.base.process import count_processes
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene import overrides
@@ -135,9 +135,7 @@ def sweep(
     """
     if repeat < 1:
         raise InputFault(f"--repeat {repeat}: give 1 or more")
-    if jobs is not None and jobs < 1:
-        raise InputFault(f"--jobs {jobs}: give 1 or more")
-    formats = figure_files.formats(format)
+    processes, formats = count_processes(jobs), figure_files.formats(format)
     varied = points(vary, runs)
     made = job.jobs(scene, overrides.write_options(options), varied, repeat)
     if metric:
@@ -146,7 +144,6 @@ def sweep(
 
     def into(folder: Path) -> list[row.Row]:
         tell = progress or (lambda done, of: None)
-        processes = jobs or os.cpu_count() or 1
         return make(made, folder, processes, scheduler, lambda done: tell(done, len(made)))
 
     if out is None:

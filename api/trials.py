@@ -102,9 +102,7 @@ def trial(
 
     Raises InputFault for settings that do not fit the scene, and without a board.
     """
-    read = open_scene.load(scene, options)
-    if device is not None:
-        read = open_scene.load(read, runs.with_board(device))
+    read = open_scene.load(open_scene.load(scene, options), runs.with_board(device))
     board = driver_of(read, "")
     if feel is None and not board:
         raise InputFault(

@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 from typing import Annotated
 
 from cyclopts import Parameter
@@ -8,6 +7,7 @@ from cyclopts import Parameter
 from hapticlink.commands import progress
 from hapticlink.commands.options import PRINTED, UNCHANGED, Output, Scene, SceneOptions, title
 from hapticlink.commands.sweep import Jobs
+from hapticlink.orchestrator.base.process import count_processes
 
 Seed = Annotated[int, Parameter(help="Seed of the draws.")]
 
@@ -36,8 +36,8 @@ def advise(
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
 
+    processes = count_processes(jobs)
     folder = folders.ensure(output.out or changes.folder("advice", scene))
-    processes = jobs or os.cpu_count() or 1
     with progress.runs(f"{title(scene)}: methods on it and around it", output.quiet) as tell:
         advice = find(scene, changes.options, folder, processes=processes, seed=seed, tell=tell)
     write_json(folder / "advice.json", advice.record())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 import webbrowser
+from dataclasses import dataclass
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Annotated
 
@@ -35,41 +36,53 @@ Port = Annotated[
 Browser = Annotated[bool, Parameter(help="Open the page in the browser.")]
 
 
-def start_server(host: str, port: int | None, *arguments: str) -> ChildProcess:
-    """The page's server, which begins to start."""
-    if not find_spec("websockets"):
-        raise InputFault(f"the page needs the package websockets: {install_command('view')}")
-    from hapticlink.visualization.live_page.server_pipe import ChildProcess
+@Parameter(name="*")
+@dataclass(frozen=True)
+class PageAddress:
+    """Where a page is served, and whether a browser opens it."""
 
-    return ChildProcess("hapticlink.visualization.live_page.server", host, ports(port), *arguments)
+    host: Host = "127.0.0.1"
+    port: Port = None
+    browser: Browser = True
+
+    @property
+    def ports(self) -> tuple[int, ...]:
+        """Those of which the first free one is taken; 0 is any."""
+        return (PORT, 0) if self.port is None else (self.port,)
+
+    def start_server(self, *arguments: str) -> ChildProcess:
+        """The page's server, which begins to start."""
+        if not find_spec("websockets"):
+            raise InputFault(f"the page needs the package websockets: {install_command('view')}")
+        from hapticlink.visualization.live_page.server_pipe import ChildProcess
+
+        module = "hapticlink.visualization.live_page.server"
+        return ChildProcess(module, self.host, self.ports, *arguments)
+
+    def show_served(self, title: str, link: ChildProcess, token: str) -> None:
+        """As `show`, once the server listens. Raises InputFault where it cannot."""
+        if (first := link.first()) is None:
+            raise Fault("the page's server does not start")
+        if "error" in first:
+            raise self.refused(first["error"])
+        self.show(title, int(first["port"]), token)
+
+    def show(self, title: str, port: int, token: str) -> None:
+        """Say the page's address, and open it in a browser that would open a window of its own, and
+        not take over the terminal."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        url = f"http://{host}:{port}/{token}/"
+        say(f"{title}: {url}")
+        sys.stdout.flush()
+        screen = sys.platform in ("win32", "darwin") or any(map(os.environ.get, SCREENS))
+        if self.browser and screen:
+            webbrowser.open(url)
+
+    def refused(self, why: object) -> InputFault:
+        """The fault of an address that cannot be served on."""
+        asked = f"--host {self.host}"
+        asked += "" if self.port is None else f" --port {self.port}"
+        return InputFault(f"{asked}: {why}: choose another")
 
 
-def port_of(link: ChildProcess, host: str, port: int | None) -> int:
-    """The port that the server listens on. Raises InputFault where it cannot."""
-    if (first := link.first()) is None:
-        raise Fault("the page's server does not start")
-    if "error" in first:
-        raise InputFault(say_refused(host, port, first["error"]))
-    return int(first["port"])
-
-
-def ports(port: int | None) -> tuple[int, ...]:
-    """Those of which the first free one is taken; 0 is any."""
-    return (PORT, 0) if port is None else (port,)
-
-
-def show(title: str, host: str, port: int, token: str, browser: bool) -> None:
-    """Say the page's address, and open it in a browser that would open a window of its own, and not
-    take over the terminal."""
-    url = f"http://{f'[{host}]' if ':' in host else host}:{port}/{token}/"
-    say(f"{title}: {url}")
-    sys.stdout.flush()
-    screen = sys.platform in ("win32", "darwin") or any(map(os.environ.get, SCREENS))
-    if browser and screen:
-        webbrowser.open(url)
-
-
-def say_refused(host: str, port: int | None, why: object) -> str:
-    """That the address cannot be served on."""
-    asked = f"--host {host}" if port is None else f"--host {host} --port {port}"
-    return f"{asked}: {why}: choose another"
+LOCAL = PageAddress()

@@ -88,22 +88,10 @@ def stability(
     import hapticlink as hl
 
     given, name, quiet = changes.options, title(scene), output.quiet
-    if largest:
-        return _z_width(scene, largest, vary or [], changes, jobs, output)
     if vary:
-        folder = output.out or changes.folder("maps", scene)
-        command = f"hapticlink stability {scene} --vary {' --vary '.join(vary)}"
-        with time_command(command, hidden=quiet), count_runs(scene, hidden=quiet) as count:
-            points = hl.stability_map(
-                scene, vary, given, out=folder, check=check, seed=seed, jobs=jobs, progress=count
-            )
-        verdicts = [row["verdict"] for row in points.of("grid")]
-        counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
-        keys = [text.partition("=")[0] for text in vary]
-        lines = [*_of_map(points, keys), f"{folder}/: map.csv, map.png"]
-        found: dict[str, Any] = {"folder": str(folder), "rows": points.rows}
-        output.show(f"{name}: {len(verdicts)} points, {counts}", lines, found)
-        return 0
+        return _over_keys(scene, vary, largest, check, seed, changes, jobs, output)
+    if largest:
+        raise hl.InputFault("--largest needs --vary: over which keys, e.g. --vary haptics.rate=512")
     from hapticlink.analysis.stability.modes import Bounds
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
@@ -135,29 +123,38 @@ def stability(
     return 0
 
 
-def _z_width(
+def _over_keys(
     scene: str,
-    largest: str,
     vary: Sequence[str],
+    largest: str | None,
+    check: int,
+    seed: int,
     changes: SceneOptions,
     jobs: int | None,
     output: Output,
 ) -> int:
+    """A map, or where a largest value is asked for, a Z-width."""
     import hapticlink as hl
 
-    if not vary:
-        raise hl.InputFault("--largest needs --vary: over which keys, e.g. --vary haptics.rate=512")
     folder, quiet = output.out or changes.folder("maps", scene), output.quiet
-    command = f"hapticlink stability {scene} --largest {largest} --vary {' --vary '.join(vary)}"
+    keys, given = [text.partition("=")[0] for text in vary], changes.options
+    searched = f" --largest {largest}" if largest else ""
+    command = f"hapticlink stability {scene}{searched} --vary {' --vary '.join(vary)}"
     with time_command(command, hidden=quiet), count_runs(scene, hidden=quiet) as count:
-        rows = hl.z_width(
-            scene, largest, vary, changes.options, out=folder, jobs=jobs, progress=count
-        )
-    lines = [*_of_limits(rows, [text.partition("=")[0] for text in vary])]
-    found = {"folder": str(folder), "rows": rows}
-    key = largest.partition("=")[0]
-    files = f"{folder}/: z-width.csv, z-width.png"
-    output.show(f"{title(scene)}: largest {key}", [*lines, files], found)
+        if largest:
+            rows = hl.z_width(scene, largest, vary, given, out=folder, jobs=jobs, progress=count)
+            found, lines = f"largest {largest.partition('=')[0]}", [*_of_limits(rows, keys)]
+            files = "z-width.csv, z-width.png"
+        else:
+            points = hl.stability_map(
+                scene, vary, given, out=folder, check=check, seed=seed, jobs=jobs, progress=count
+            )
+            verdicts = [row["verdict"] for row in points.of("grid")]
+            counts = ", ".join(f"{verdicts.count(v)} {v}" for v in dict.fromkeys(verdicts))
+            found, lines = f"{len(verdicts)} points, {counts}", [*_of_map(points, keys)]
+            rows, files = points.rows, "map.csv, map.png"
+    record = {"folder": str(folder), "rows": rows}
+    output.show(f"{title(scene)}: {found}", [*lines, f"{folder}/: {files}"], record)
     return 0
 
 

@@ -1,11 +1,11 @@
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from hapticlink.commands import checkout
 from hapticlink.commands.options import Out
 from hapticlink.commands.sweep import Jobs
+from hapticlink.orchestrator.base.process import count_processes
 from hapticlink.orchestrator.base.terminal_output import say
 
 
@@ -17,7 +17,7 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
 
     make = checkout.function("study", "studies.mismatch:study")
     expected = checkout.function("study", "studies.mismatch:expected")
-    processes = jobs or os.cpu_count() or 1
+    processes = count_processes(jobs)
     guess = f"about {expected(processes):.0f} minutes with {processes} processes"
     with time_command("hapticlink study", guess), count_runs("study") as tell:
         page = make(

@@ -16,7 +16,7 @@ from hapticlink.commands.options import (
     default_folder,
     title,
 )
-from hapticlink.commands.page_server import Browser, Host, Port, port_of, show, start_server
+from hapticlink.commands.page_server import LOCAL, PageAddress
 from hapticlink.commands.run import Device
 from hapticlink.commands.sweep import Vary
 from hapticlink.orchestrator.base.errors import InputFault
@@ -48,9 +48,7 @@ def trial(
     staircase: Stairs = False,
     seed: Seed = 0,
     page: OnPage = False,
-    host: Host = "127.0.0.1",
-    port: Port = None,
-    browser: Browser = True,
+    address: PageAddress = LOCAL,
     format: Format = "png",
     output: Output = PRINTED,
 ) -> int:
@@ -89,11 +87,11 @@ def trial(
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
         from hapticlink.visualization.live_page.trial_page import TrialPage
 
-        options = (*changes.options, *write_options(with_board(device) if device else {}))
+        options = (*changes.options, *write_options(with_board(device)))
         read = load_viewed_scene(scene, options, hl.scene(scene, options).duration)
         token = secrets.token_urlsafe(16)
-        with start_server(host, port, token) as link:
-            show(read.title, host, port_of(link, host, port), token, browser)
+        with address.start_server(token) as link:
+            address.show_served(read.title, link, token)
             shown = TrialPage(link, hl.RealTime, read)
             result = hold_trial(read, vary, ask=shown.ask, feel=shown.feel, **how)
             shown.tell(f"{result}: the trials have ended")

@@ -11,16 +11,7 @@ from cyclopts import Parameter
 
 from hapticlink.commands import completion
 from hapticlink.commands.options import UNCHANGED, Out, SceneOptions, default_folder
-from hapticlink.commands.page_server import (
-    Browser,
-    Host,
-    Port,
-    port_of,
-    ports,
-    say_refused,
-    show,
-    start_server,
-)
+from hapticlink.commands.page_server import LOCAL, PageAddress
 from hapticlink.commands.progress import waiting
 from hapticlink.commands.run import Device
 from hapticlink.commands.stop_key import wait_for_enter
@@ -66,9 +57,7 @@ def view(
     out: Out = None,
     changes: SceneOptions = UNCHANGED,
     device: Device = None,
-    host: Host = "127.0.0.1",
-    port: Port = None,
-    browser: Browser = True,
+    address: PageAddress = LOCAL,
     speed: Speed = 1.0,
     export: Export = None,
     standalone: Standalone = None,
@@ -95,7 +84,7 @@ def view(
             )
         if standalone:
             raise InputFault(f"--standalone: {scene} is the folder of a run; give a scene")
-        return _replay([scene, *([second] if second else [])], host, port, browser, export)
+        return _replay([scene, *([second] if second else [])], address, export)
     if second or export:
         given = second or f"--export {export}"
         raise InputFault(
@@ -113,20 +102,19 @@ def view(
     root = out or default.with_name(f"{default.name}-view")
     token = secrets.token_urlsafe(16)
     second_run = "hapticlink.commands.view_second_run", f"{root}-b"
-    with start_server(host, port, token, *second_run) as link:
+    with address.start_server(token, *second_run) as link:
         import hapticlink as hl
         from hapticlink.api.runs import with_board
         from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 
-        board = write_options(with_board(device)) if device else ()
-        read = load_viewed_scene(scene, (*changes.options, *board))  # while the server starts
+        options = (*changes.options, *write_options(with_board(device)))
+        read = load_viewed_scene(scene, options)  # while the server starts
         if driver_of(read, ""):
             from hapticlink.api.board_start import start_at_handle  # slow to load
 
             read = start_at_handle(read, wait_for_enter)
-        served_port = port_of(link, host, port)
-        show(read.title, host, served_port, token, browser)
+        address.show_served(read.title, link, token)
         hand = "whoever holds the board is" if driver_of(read, "") else "the mouse is"
         say(f"  {hand} the hand, in place of the scene's; Ctrl-C ends it")
         from hapticlink.visualization.live_and_standalone.offered_controls import SPEED
@@ -156,9 +144,7 @@ def _write_page(name: str, changes: SceneOptions, path: Path) -> int:
     return 0
 
 
-def _replay(
-    folders: list[str], host: str, port: int | None, browser: bool, export: Path | None
-) -> int:
+def _replay(folders: list[str], address: PageAddress, export: Path | None) -> int:
     """Replay recorded runs on a page until Ctrl-C, or write them to a file."""
     from hapticlink.visualization.replay import replay_page, serve
     from hapticlink.visualization.replay.recorded_frames import Recorded
@@ -173,10 +159,10 @@ def _replay(
     html, token = replay_page.html(runs), secrets.token_urlsafe(16)
     with ExitStack() as pages, suppress(Interrupted):
         try:
-            at = pages.enter_context(serve.serve_page(html, host, ports(port), token))
+            at = pages.enter_context(serve.serve_page(html, address.host, address.ports, token))
         except OSError as error:
-            raise InputFault(say_refused(host, port, error)) from None
-        show(" beside ".join(folders), host, at, token, browser)
+            raise address.refused(error) from None
+        address.show(" beside ".join(folders), at, token)
         say("  a replay, with a time slider; Ctrl-C ends it")
         while True:
             interrupt.raise_if_interrupted()

@@ -17,6 +17,7 @@ import math
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from types import MappingProxyType
 from typing import Literal
 
 import casadi as ca
@@ -26,9 +27,6 @@ from hapticlink.components.schematic_parts import BlockPart, require_complete
 from hapticlink.components.time_signals import LookUp, TimeSignal
 
 Timing = Literal["continuous", "sampled", "frame"]
-STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
-"""Parameters that a run sets, where a block has them: the longest communication step (s) of the
-block, and of the graphics copy. No block is built for a step size."""
 Variability = Literal["fixed", "tunable"]
 
 
@@ -237,9 +235,9 @@ class Block:
         description: str,
         timing: Timing,
         *,
-        initial: Mapping[str, ca.SX],
-        step: Mapping[str, ca.SX] | ca.SX,
         output: Mapping[str, ca.SX],
+        initial: Mapping[str, ca.SX] = MappingProxyType({}),
+        step: Mapping[str, ca.SX] | ca.SX = MappingProxyType({}),
         substeps: int = 1,
         memory: Collection[str] = (),
         documentation: str = "",

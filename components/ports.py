@@ -13,6 +13,10 @@ Kind = Literal["projector", "semidefinite", "angle", "table", "count"]
 projector, a symmetric positive semidefinite matrix, wrapped angles, or a table, whose rows are
 records and have no values between two samples, nor have whole numbers, a count."""
 
+STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
+"""Parameters that a run sets, where a block has them: the longest communication step (s) of the
+block, and of the graphics copy. No block is built for a step size."""
+
 
 @dataclass(frozen=True)
 class Power:

@@ -81,8 +81,8 @@ def functions_of_fmu(component: Component) -> OnePass:
 
 
 GRAPHS = threading.RLock()
-"""Held by the thread that derives equations: `_unsimplified` sets an option of the whole process,
-under which another thread would derive other graphs."""
+"""Held by the thread that derives equations: `_without_simplification` sets an option of the whole
+process, under which another thread would derive other graphs."""
 
 
 @contextmanager

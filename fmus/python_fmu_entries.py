@@ -61,7 +61,8 @@ def require_platform() -> None:
 
 def entries(component: Component, **experiment: float) -> dict[str, bytes]:
     """All files of the FMU; GUID and name of the slave contain a hash of them. experiment: as of
-    `described`. Raises FmuError where the component's functions and variables do not fit."""
+    `describe_component`. Raises FmuError where the component's functions and variables do not
+    fit."""
     check_functions(component)
     parts = functions_of_fmu(component)
     texts = {f.name(): f.serialize() for f in parts.functions}

@@ -138,8 +138,7 @@ def attach(
     """The system, whose device that asks for a simulated board gets the port of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
-    boards = [u for u in system.fmus if u.driver and not u.stand_in]
-    asking = [u for u in boards if u.driver and u.driver.port == SIMULATED_BOARD]
+    asking = [u for u in system.fmus if u.driver and u.driver.port == SIMULATED_BOARD]
     if not asking:
         yield system
         return
@@ -161,7 +160,7 @@ def attach(
                     raise InputFault(f"{SIMULATED_BOARD}: its process ended before it was ready")
                 (fmu,) = asking
                 assert fmu.driver
-                there = replace(fmu, driver=replace(fmu.driver, port=port))
+                there = replace(fmu, in_its_place=replace(fmu.driver, port=port))
                 yield replace(system, fmus=tuple(there if u is fmu else u for u in system.fmus))
             finally:
                 process.kill()

@@ -11,7 +11,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
-from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Component
+from hapticlink.components.component import Component
+from hapticlink.components.ports import FRAME_SIZE, STEP_SIZE
 from hapticlink.fmus.errors import FmuError
 from hapticlink.fmus.scalar_variables import ScalarVariable, scalar_variables
 from hapticlink.orchestrator.fmi.description import Description
@@ -168,7 +169,7 @@ def _energies(resolved: Resolved) -> Iterator[Port]:
     for index, connection in enumerate(resolved.meters):
         c = resolved.system.connection[connection]
         text = f"Energy that sampling and holding {connection} has generated."
-        yield Port("ENERGY", f"energy.{c.target}.{c.target_port}", "J", text, index)
+        yield Port("ENERGY", f"energy.{c.to}", "J", text, index)
 
 
 def _step_errors(resolved: Resolved) -> Iterator[Port]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hapticlink.analysis.findings.tracking import of_any_shape, of_block
+from hapticlink.analysis.findings.tracking import newest, of_any_shape, of_block
 from hapticlink.components.specs.linkage import NO_POINT
 from hapticlink.orchestrator.base.signal_names import (
     COUPLING_ENERGY,
@@ -56,8 +56,7 @@ def _last(results: Results, time: float, signal: str) -> Vector | None:
     """The newest sample of a signal at a time (s)."""
     if (table := of_any_shape(results, signal)) is None or not len(table["time"]):
         return None
-    row = int(np.searchsorted(table["time"], time + 1e-12, "right")) - 1
-    sample: Vector = table[signal][row]
+    sample: Vector = table[signal][newest(table, time)]
     return sample
 
 

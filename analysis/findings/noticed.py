@@ -26,6 +26,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from hapticlink.analysis.findings.tracking import (
     UserSignals,
     find_users,
+    newest,
     of_block,
     of_port,
     space_of,
@@ -88,8 +89,8 @@ def _of_coupling(results: Results, user: UserSignals) -> NoticedError | None:
 
     def of_rows(time: Vector, hand: Vector, drift: Vector) -> Vector:
         if held and S is not None:
-            newest = np.searchsorted(held["time"], time + ROUNDING, "right") - 1
-            drift = drift - S * np.einsum("kij,kj->ki", held[projector][newest], drift / S)
+            P = held[projector][newest(held, time)]
+            drift = drift - S * np.einsum("kij,kj->ki", P, drift / S)
         return np.concatenate([hand.T[: space.lengths], drift.T[: space.lengths]])
 
     felt = table.by_row(of_rows, "time", user.hand, user.drift)

@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from hapticlink.orchestrator.scene.toml_keys import parts, value
+
 
 class Premise(NamedTuple):
     """What a setting of a scene decides, the setting, its value in the report, and what another
@@ -71,16 +73,8 @@ def find_differences(scene: Mapping[str, Any]) -> Iterator[str]:
     """In what a run of a scene (its tables, with all defaults) differs from the experiment of the
     report that it is; nothing for one that is none."""
     for premise in OF_THE_REPORT.get(scene.get("experiment", ""), ()):
-        if (value := setting(scene, premise.key)) != premise.value:
-            yield premise.instead.get(value, f"{premise.key} = {value}")
-
-
-def setting(scene: Mapping[str, Any], key: str) -> Any:
-    """The value of a dotted key, None in a table that the scene does not have."""
-    value: Any = scene
-    for name in key.split("."):
-        value = (value or {}).get(name)
-    return value
+        if (found := value(scene, parts(premise.key))) != premise.value:
+            yield premise.instead.get(found, f"{premise.key} = {found}")
 
 
 def describe_experiment(scene: Mapping[str, Any]) -> Iterator[str]:

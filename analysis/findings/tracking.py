@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hapticlink.analysis.findings.rendered import recorded_handle
 from hapticlink.components.dynamics.rendered_directions import rendered_directions
@@ -227,6 +228,11 @@ def path_of_point(results: Results, user: UserSignals) -> str:
     """The signal with which wrenches at a user's point are paired for their work."""
     changes = user == FIRST and of_port(results, POINT_PATH) is not None
     return POINT_PATH if changes else user.point
+
+
+def newest(table: Table, times: float | Vector) -> NDArray[np.intp]:
+    """The newest row at each of the times (s); the first one before it."""
+    return np.maximum(np.searchsorted(table["time"], times + 1e-12, "right") - 1, 0)
 
 
 def rows_until(table: Table, time: float) -> slice:

@@ -30,6 +30,7 @@ from hapticlink.analysis.findings.tracking import (
     compared_directions,
     find_users,
     have_one_shape,
+    newest,
     of_any_shape,
     of_block,
     of_port,
@@ -102,7 +103,7 @@ def tolerated_energy(hand_work: float) -> float:
 
 
 def allowance(hand_work: float, whose: str = "the hand") -> str:
-    """What is `allowed`, in words, for `whose` work."""
+    """What is tolerated, in words, for `whose` work."""
     most = f"{short(1e3 * tolerated_energy(hand_work))} mJ"
     if SHARE * hand_work < NOTICEABLE_J:
         return f"{most}, the least that a hand notices"
@@ -121,7 +122,7 @@ def hand_work(results: Results) -> float:
 
 
 def tolerated_in_run(results: Results) -> float:
-    """What is `allowed` (J) in a run."""
+    """What is tolerated (J) in a run."""
     return tolerated_energy(hand_work(results))
 
 
@@ -216,11 +217,11 @@ def _hold_mobility(results: Results, device: Table) -> Vector | None:
     inertia_of_handle = next(inertias, None)
     if inertia_of_handle is None:
         return None
-    times, mobility = held["time"], held[MOBILITIES[0]]
+    mobility = held[MOBILITIES[0]]
     signals = [s for s in (DRIFT_WRENCH, ENVIRONMENT_WRENCH) if s in device]
 
     def added(time: Vector, own: Vector, inertia: Vector, hand: Vector, *others: Vector) -> Vector:
-        change = mobility[np.searchsorted(times, time + 1e-12, "right") - 1] - own
+        change = mobility[newest(held, time)] - own
         wrench = sum(others, start=hand)
         force: Vector = np.einsum("kij,kjl,kl->ki", inertia, change, wrench)
         return force.T

@@ -23,6 +23,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from hapticlink.analysis.fit.log import read_columns
 from hapticlink.components.component import Variable
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.models import device_model
@@ -33,7 +34,6 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.base.signal_names import DEVICE
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import read_table
 
 ANGLES, PLACE = f"{DEVICE}.q", "place"
 """Columns of a log."""
@@ -326,10 +326,9 @@ class _Problem:
 
 
 def read_angles(path: Path | str, device: Device) -> tuple[Matrix, Matrix | None]:
-    """Angles of the encoders (n, e) of a log, a CSV or the folder of a run, and the known places of
-    the handle (n, 2) where it has them. Raises InputFault for a log without the angles."""
-    path = Path(path)
-    table = read_table(path / "haptics.csv" if path.is_dir() else path)
+    """Angles of the encoders (n, e) of a log (`log.read_columns`), and the known places of the
+    handle (n, 2) where it has them. Raises InputFault for a log without the angles."""
+    path, table = read_columns(path)
     n = len(device.encoders)
     if ANGLES not in table or table[ANGLES].shape[1:] != (n,):
         raise InputFault(

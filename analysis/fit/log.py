@@ -52,17 +52,11 @@ class Log:
 
 
 def read_log(path: Path | str) -> Log:
-    """The log in a CSV or HDF5 file (`.h5`, `.hdf5`), or that of a run in its folder. Raises
-    InputFault for a file without the pose, or whose samples are not finite, not evenly spaced, or
-    come at a rate that no device has."""
-    path = Path(path)
-    if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
-        path = path / "haptics.csv"
-    elif not text_files.exists(path):
-        raise InputFault(f"{path}: cannot be read as a log: not a regular file")
+    """The log of `read_columns`. Raises InputFault for a file without the pose, or whose samples
+    are not finite, not evenly spaced, or come at a rate that no device has."""
+    path, table = read_columns(path)
     run = path.parent / "run.json"
     of_run = path.name == "haptics.csv" and run.is_file()
-    table = _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
     pose = next((name for name in MEASURED_HANDLE_POSES if name in table), None)
     if not ("time" in table and pose):
         raise InputFault(
@@ -102,6 +96,17 @@ def read_log(path: Path | str) -> Log:
         held=of_run,
         hand_type=_hand_type(run) if of_run else "",
     )
+
+
+def read_columns(path: Path | str) -> tuple[Path, Table]:
+    """The file of a log, and its columns: a CSV or HDF5 file (`.h5`, `.hdf5`), or that of a run in
+    its folder. Raises InputFault for a file that cannot be read."""
+    path = Path(path)
+    if os.path.isdir(path):  # Path.is_dir raises for a name that is too long
+        path = path / "haptics.csv"
+    elif not text_files.exists(path):
+        raise InputFault(f"{path}: cannot be read as a log: not a regular file")
+    return path, _hdf5(path) if path.suffix in (".h5", ".hdf5") else read_table(path)
 
 
 def _longest_whole(signals: dict[str, Matrix]) -> dict[str, Matrix]:

@@ -134,7 +134,7 @@ class Gains:
 
 
 def _entries(fmu: Fmu, port: str) -> tuple[tuple[Scalar, float], ...]:
-    given = {scalar.name: value for scalar, value in fmu.starts}
+    given = fmu.start_values
     return tuple(
         (s, float(given.get(s.name, s.start or 0.0)))
         for s in fmu.description.scalars

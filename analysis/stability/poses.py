@@ -235,14 +235,14 @@ def is_hand_replaced(read: Scene) -> bool:
 
 def visited_poses(run: Results) -> tuple[Matrix, Matrix]:
     """The poses of the operational point, (k, 3), and the joint coordinates, (k, n), of a run.
-    Raises InputFault as `evenly_spaced`."""
+    Raises InputFault as `choose_evenly_spaced`."""
     table = _read_poses(run)
     return table[POINT_POSE], table[JOINT_COORDINATES]
 
 
 def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     """The mean pose over the part of a run from `since` (0 to 1) of it on. Raises InputFault as
-    `evenly_spaced`."""
+    `choose_evenly_spaced`."""
     table = _read_poses(run)
     n = len(table["time"])
     part = slice(min(n - 1, int(since * n)), n)

@@ -172,7 +172,7 @@ def _identified(
     def stand_in(*arguments: Any) -> Instance:
         return LinearInstance(response, inputs, once[0], *arguments)
 
-    return replace(fmu, description=described, isolate=False, stand_in=stand_in)
+    return replace(fmu, description=described, isolate=False, in_its_place=stand_in)
 
 
 def _inputs_in(run: Results, connections: Iterable[Connection], T: float) -> Matrix | None:
@@ -264,9 +264,6 @@ class LinearInstance(Instance):
 
         return set_from
 
-    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        return None
-
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
         """Nothing to be told."""
 
@@ -287,9 +284,6 @@ class LinearInstance(Instance):
         x[:] = of.A @ x + of.B @ du
         self.place.time = end
 
-    def finish(self) -> None:
-        """Nothing to wait for."""
-
     def save(self, slot: int = 0) -> None:
         self._saved[slot] = self._state.copy(), self.time
 
@@ -301,12 +295,3 @@ class LinearInstance(Instance):
 
     def deserialize(self, state: bytes) -> None:
         self._state[:] = np.frombuffer(state)
-
-    def dismiss(self) -> None:
-        """Nothing to close."""
-
-    def abandon(self) -> None:
-        """Nothing is called."""
-
-    def close(self) -> FmuFault | None:
-        return None

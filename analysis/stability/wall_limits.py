@@ -127,12 +127,13 @@ def stable(m: float, b: float, T: float, periods: int = 0, B: float = 0.0) -> fl
     the K of the root -1. Raises ValueError for b <= 0 and where the loop is stable for no K.
     """
     if b == 0.0:
-        raise ValueError("b = 0: the limit without damping is that of `undamped`")
+        raise ValueError("b = 0: the limit is that of `limit_without_damping`")
     e, (first, second) = _device(m, b, T, periods)
     if not periods and not B:
         return min(-math.expm1(-b * T / m) / second, 2.0 * (1.0 + e) / (first - second))
     if b * T / m < SMALLEST:
-        raise ValueError(f"b = {b}: b T/m below {SMALLEST} is lost in rounding; see `undamped`")
+        lost = f"b T/m below {SMALLEST} is lost in rounding"
+        raise ValueError(f"b = {b}: {lost}; see `limit_without_damping`")
 
     def gain(theta: float) -> complex:
         """The K, in general complex, with a root at exp(i theta)."""

@@ -48,17 +48,11 @@ def _virtual_mechanism(
 ) -> Component:
     from hapticlink.components.blocks.virtual_mechanism import virtual_mechanism
 
-    frame_s = FRAME if local_model else None
-    options: dict[str, Any] = {
-        "length_scale": length_scale,
-        "frame_s": frame_s,
-        "felt": felt,
-        "users": users,
-        "coupled": coupled,
-        "followed": followed,
-        "handles": handles,
-    }
-    return virtual_mechanism(linkage, mechanism, directions, contacts, **options)
+    return virtual_mechanism(
+        linkage, mechanism, directions, contacts, length_scale=length_scale,
+        frame_s=FRAME if local_model else None, felt=felt, users=users, coupled=coupled,
+        followed=followed, handles=handles,
+    )  # fmt: skip
 
 
 def _virtual_environment(
@@ -74,15 +68,10 @@ def _virtual_environment(
 ) -> Component:
     from hapticlink.components.blocks.virtual_environment import virtual_environment
 
-    options: dict[str, Any] = {
-        "mobility": mobility,
-        "local_model": local_model,
-        "frame_s": FRAME,
-        "users": users,
-        "predicted": predicted,
-        "handles": handles,
-    }
-    return virtual_environment(linkage, graphics, directions, contacts, **options)
+    return virtual_environment(
+        linkage, graphics, directions, contacts, mobility=mobility, local_model=local_model,
+        frame_s=FRAME, users=users, predicted=predicted, handles=handles,
+    )  # fmt: skip
 
 
 def _haptic_device(device: Device, encoders: bool = False) -> Component:

@@ -71,7 +71,7 @@ class _Motion:
         self.names = ("x_true", "v_true") if whole else ("place", "rate")
         self.states = [
             variables.place(model, self.names[0], "place of the device"),
-            variables.rate(model, self.names[1], "velocity of the handle"),
+            variables.felt(model, "twist", self.names[1], "velocity of the handle"),
         ]
 
     def of(self, block: Block) -> tuple[ca.SX, ca.SX]:

@@ -20,15 +20,10 @@ _EFFORTS = (".F_hand", ".F_drift", ".effort")
 """How the inputs end by which others than the operational point's hand act on the linkage."""
 
 
-def mechanism_parts(
-    block: Block, linkage: Linkage, mechanism: Mechanism, alpha: str
-) -> list[BlockPart]:
+class MechanismParts:
     """The parts, in the order of their evaluation. alpha: by which default Baumgarte's alpha comes
     about, in words; "" if the scene gives it."""
-    return [*_MechanismParts(block, linkage, mechanism, alpha)]
 
-
-class _MechanismParts:
     def __init__(self, block: Block, linkage: Linkage, mechanism: Mechanism, alpha: str) -> None:
         self._block, self._linkage, self._mechanism, self._alpha = block, linkage, mechanism, alpha
         self._outputs = [v.name for v in block.outputs]

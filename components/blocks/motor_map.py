@@ -30,8 +30,6 @@ def motor_map(device: Device) -> Component:
         "motor_map",
         "Torques of a device's motors for a wrench at its handle",
         "sampled",
-        initial={},
-        step={},
         output={"tau": tau},
         documentation=__doc__ or "",
     )

@@ -45,8 +45,6 @@ def signal(
         "signal",
         "A signal over time",
         "sampled",
-        initial={},
-        step={},
         output={"y": y},
         documentation=__doc__ or "",
         signals=read,

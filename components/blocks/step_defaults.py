@@ -6,10 +6,11 @@ from __future__ import annotations
 
 import math
 
-from hapticlink.components.component import FRAME_SIZE, STEP_SIZE, Signals, Variable
+from hapticlink.components.component import Signals, Variable
 from hapticlink.components.contact import contact_forces
 from hapticlink.components.dynamics import friction_scale
 from hapticlink.components.integrators import METHODS, base
+from hapticlink.components.ports import FRAME_SIZE, STEP_SIZE
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Linkage, Mechanism
 

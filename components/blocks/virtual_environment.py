@@ -15,7 +15,7 @@ from types import MappingProxyType
 import casadi as ca
 import numpy as np
 
-from hapticlink.components.component import FRAME_SIZE, Block, Component, Variable
+from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.contact import contact_forces, kept_sides
 from hapticlink.components.contact.kept_sides import KeptSides
 from hapticlink.components.dynamics import follow_mechanism, further_points, gradients, grasp
@@ -38,6 +38,7 @@ from hapticlink.components.dynamics.variables import (
 )
 from hapticlink.components.linkage import branch
 from hapticlink.components.linkage.model import LinkageModel
+from hapticlink.components.ports import FRAME_SIZE
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, coordinates

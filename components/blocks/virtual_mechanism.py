@@ -17,7 +17,7 @@ from types import MappingProxyType
 import casadi as ca
 
 from hapticlink.components import forces, integrators, time_signals
-from hapticlink.components.blocks.mechanism_parts import mechanism_parts
+from hapticlink.components.blocks.mechanism_parts import MechanismParts
 from hapticlink.components.blocks.mechanism_steps import DEFLECTIONS, MechanismSteps
 from hapticlink.components.blocks.step_defaults import StepDefaults
 from hapticlink.components.component import Block, Component, Variable
@@ -112,7 +112,7 @@ def virtual_mechanism(
         documentation=__doc__ or "",
         shared=not frame_s and not equations.touching,
         signals=equations.signals,
-        parts=mechanism_parts(block, linkage, mechanism, defaults.alpha_text),
+        parts=MechanismParts(block, linkage, mechanism, defaults.alpha_text),
     )
     require_assembled(component, equations.model)
     require_inertia(component, equations.model)

@@ -18,10 +18,11 @@ from __future__ import annotations
 
 import casadi as ca
 
-from hapticlink.components.component import STEP_SIZE, Block, Component, Variable
+from hapticlink.components.component import Block, Component, Variable
 from hapticlink.components.control import passivity as observer
 from hapticlink.components.device.motors_and_encoders import quantised
 from hapticlink.components.port_space import LINE
+from hapticlink.components.ports import STEP_SIZE
 from hapticlink.components.specs.control import PassivityLaw
 
 PERIOD = 1e-3

@@ -24,8 +24,9 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from hapticlink.components.component import STEP_SIZE, Signals, Variable
+from hapticlink.components.component import Signals, Variable
 from hapticlink.components.port_space import PortSpace
+from hapticlink.components.ports import STEP_SIZE
 from hapticlink.components.schematic_parts import BlockPart
 from hapticlink.components.specs.control import PassivityLaw
 

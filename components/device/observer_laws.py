@@ -9,12 +9,13 @@ from typing import Any, Protocol
 
 import casadi as ca
 
-from hapticlink.components.component import STEP_SIZE, Signals, Variable
+from hapticlink.components.component import Signals, Variable
 from hapticlink.components.device import variables
 from hapticlink.components.device.device_model import DeviceModel
 from hapticlink.components.device.kalman_observer import NOMINAL, KalmanObserver, bandwidth
 from hapticlink.components.device.motors_and_encoders import mass_and_count
 from hapticlink.components.device.observer import HandleObserver
+from hapticlink.components.ports import STEP_SIZE
 
 BY_A_COUNT, FASTEST = 0.11, 300.0
 """Error of the force (N) by a count from which the default bandwidth of nicosia follows, and the
@@ -36,13 +37,13 @@ def states(model: DeviceModel) -> tuple[Variable, ...]:
     if model.device.observer.law == "nicosia":
         return (
             variables.place(model, "x_measured", "pose from the encoders"),
-            variables.way(model, "x_observer", "observer state x1"),
-            variables.rate(model, "v_observer", "observer state x2"),
+            variables.felt(model, "pose", "x_observer", "observer state x1"),
+            variables.felt(model, "twist", "v_observer", "observer state x2"),
         )
     return (
         variables.place(model, "x_observer", "estimated pose"),
-        variables.rate(model, "v_observer", "estimated velocity"),
-        variables.force(model, "F_observer", "estimated wrench of the hand"),
+        variables.felt(model, "twist", "v_observer", "estimated velocity"),
+        variables.felt(model, "wrench", "F_observer", "estimated wrench of the hand"),
     )
 
 

@@ -4,6 +4,7 @@ and where a device starts."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal
 
 import casadi as ca
 
@@ -40,22 +41,12 @@ def place(model: DeviceModel, name: str, text: str) -> Variable:
     return Variable(name, *model.place, description=text)
 
 
-def way(model: DeviceModel, name: str, text: str) -> Variable:
-    """A state that is a pose in the directions that are felt."""
+def felt(
+    model: DeviceModel, kind: Literal["pose", "twist", "wrench"], name: str, text: str
+) -> Variable:
+    """A state in the directions that are felt: a pose, a velocity or a force."""
     k = model.directions.size
-    return Variable(name, (k,), model.device.space.pose.units[:k], description=text)
-
-
-def rate(model: DeviceModel, name: str, text: str) -> Variable:
-    """A state that is a velocity in the directions that are felt."""
-    k = model.directions.size
-    return Variable(name, (k,), model.device.space.twist.units[:k], description=text)
-
-
-def force(model: DeviceModel, name: str, text: str) -> Variable:
-    """A state that is a force along the directions that are felt."""
-    k = model.directions.size
-    return Variable(name, (k,), model.device.space.wrench.units[:k], description=text)
+    return Variable(name, (k,), getattr(model.device.space, kind).units[:k], description=text)
 
 
 def torque_limit(model: DeviceModel) -> Variable:

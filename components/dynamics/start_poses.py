@@ -1,8 +1,8 @@
 """Start poses of a linkage that one FMU serves: those that differ in its start values alone.
 
 Equations have the start pose as parameter. Of the poses that close, and from which the loops have
-the same dependent coordinates (linkage/branch.py), they are the same, unless the linkage has what
-`follows_from_start` tells.
+the same dependent coordinates (linkage/branch.py), they are the same, unless what
+`has_free_start` (blocks/start_settings.py) names follows from the start.
 """
 
 from __future__ import annotations

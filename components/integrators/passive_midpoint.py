@@ -25,7 +25,7 @@ grows with the pressure of its contact, which does not grow with friction.
 
 What is left is of the order h^3: potentials that are not quadratic along the step, the correction
 of closures, and E_pot where J_m s is not the displacement. It is accounted for exactly by
-`_balanced`.
+`_balance`.
 """
 
 from __future__ import annotations

@@ -45,8 +45,8 @@ def entries(
     component: Component, settings: Mapping[str, Any], **experiment: float
 ) -> dict[str, bytes]:
     """All files of the FMU of `component` by MuJoCo; `settings` are those of its block, experiment
-    as of `described`. Raises
-    FmuError, with the remedy, where mujoco is not installed and for what it does not hold."""
+    as of `describe_component`. Raises FmuError, with the remedy, where mujoco is not
+    installed and for what it does not hold."""
     if find_spec("mujoco") is None:
         raise FmuError('engine = "mujoco" needs MuJoCo: pip install "hapticlink[engine]"')
     for why in _misfits(component, settings):

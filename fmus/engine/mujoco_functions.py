@@ -221,14 +221,12 @@ class Engine:
         if not self._loops and not self._gears:
             return
         W, minv = self._closures(), self._inverse_mass()
-        back = minv @ W.T @ _pseudo_inverse(W @ minv @ W.T)
         gaps = [self._gap(loop) for loop in self._loops]
         gaps += [self._gear_gap(gear) for gear in self._gears]
-        self._d.qpos[:] -= back @ np.concatenate(gaps)
+        self._d.qpos[:] -= _back(W, minv) @ np.concatenate(gaps)
         self._positions()
         W, minv = self._closures(), self._inverse_mass()
-        back = minv @ W.T @ _pseudo_inverse(W @ minv @ W.T)
-        self._d.qvel[:] -= back @ (W @ self._d.qvel)
+        self._d.qvel[:] -= _back(W, minv) @ (W @ self._d.qvel)
 
     def _store(self, x: Array, named: dict, before: Array) -> None:
         """The engine's q and qd, with the constrained directions counted there, into x."""
@@ -311,8 +309,7 @@ class Engine:
         drawn = {p.prefix: self._jacobian(p.site).T @ self._wrench(p, inputs) for p in self._points}
         free = d.qacc_smooth - minv @ sum(drawn.values())
         W = self._closures()
-        back = minv @ W.T @ _pseudo_inverse(W @ minv @ W.T)
-        free = free - back @ (W @ free + self._closures(dot=True) @ d.qvel)
+        free = free - _back(W, minv) @ (W @ free + self._closures(dot=True) @ d.qvel)
         for point in self._points:
             J = self._jacobian(point.site)
             others = sum(Q for name, Q in drawn.items() if name != point.prefix)
@@ -356,6 +353,11 @@ class Engine:
 
 def _solref(k: float, b: float, mass: float) -> tuple:
     return (2 * mass / b, b / (2 * (k * mass) ** 0.5)) if b else (-k / mass, 0.0)
+
+
+def _back(W: Array, minv: Array) -> Array:
+    """M^-1 W' (W M^-1 W')^+, by which velocities are brought back onto closures."""
+    return minv @ W.T @ _pseudo_inverse(W @ minv @ W.T)
 
 
 def _pseudo_inverse(A: Array) -> Array:

@@ -12,8 +12,9 @@
        sampled      doStep: x, y <- advance(...), with the outputs at t_k, and further substeps;
                     get: that y
 
-   z are values for the next step that the outputs have evaluated already (one_pass.py); they are no
-   state: where p, x or t are not those that they were evaluated for, they are evaluated again.
+   z are values for the next step that the outputs have evaluated already (fmu_functions.py); they
+   are no state: where p, x or t are not those that they were evaluated for, they are evaluated
+   again.
 
    reduced, where there is one, leaves out the outputs on request of a plant. It takes the place of
    advance where these have not been read for RARELY steps, or had not been between the last two

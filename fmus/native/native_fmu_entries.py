@@ -41,7 +41,8 @@ def entries(
     **experiment: float,
 ) -> dict[str, bytes]:
     """All files of the FMU, with a binary for each of `platforms`, compiled in `folder`, and in
-    sources/ the C files from which `cc *.c` makes one for any other. experiment: as of `described`.
+    sources/ the C files from which `cc *.c` makes one for any other. experiment: as of
+    `describe_component`.
 
     The GUID is a hash of the binaries' sources (component.h has that of pieces), so that a
     platform's binary does not depend on the other platforms. Raises FmuError if no FMU can be built

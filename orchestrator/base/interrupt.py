@@ -1,10 +1,10 @@
 """Deferred handling of Ctrl-C and SIGTERM: no exception is raised in the middle of a call, as it
 would corrupt the process within an FMU's own code, and be lost within an import.
 
-The first signal is counted, and polled between two calls (`check`). A second one ends the work at
-once, wherever the process is: the actions registered by `add` end child processes and close what is
-open; then the process of a command ends, and a caller from Python gets what its own handler raises,
-usually KeyboardInterrupt.
+The first signal is counted, and polled between two calls (`raise_if_interrupted`). A second one
+ends the work at once, wherever the process is: the actions registered by `add` end child processes
+and close what is open; then the process of a command ends, and a caller from Python gets what its
+own handler raises, usually KeyboardInterrupt.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def came() -> bool:
 def raise_if_interrupted(time: float | None = None) -> None:
     """Raises Interrupted, with the simulated `time` (s), if a signal has arrived."""
     if _count:
-        from hapticlink.orchestrator.base.errors import Interrupted  # loaded within `held`
+        from hapticlink.orchestrator.base.errors import Interrupted  # loaded within `defer_signals`
 
         raise Interrupted(time)
 
@@ -132,7 +132,7 @@ def _watch(end: Action) -> Iterator[None]:
 def end_process() -> None:
     """Ends the process of a command at a second signal; removes its unfinished files and temporary
     folders."""
-    from hapticlink.fmus import atomic_file  # loaded within `held`
+    from hapticlink.fmus import atomic_file  # loaded within `defer_signals`
     from hapticlink.orchestrator.base import temporary_folders
 
     with suppress(Exception):

@@ -10,6 +10,15 @@ import threading
 from contextlib import suppress
 from io import TextIOWrapper
 
+from hapticlink.orchestrator.base.errors import InputFault
+
+
+def count_processes(jobs: int | None) -> int:
+    """The number of processes that an option `jobs` asks for, one per processor by default."""
+    if jobs is not None and jobs < 1:
+        raise InputFault(f"--jobs {jobs}: give 1 or more")
+    return jobs or os.cpu_count() or 1
+
 
 def open_streams() -> None:
     """Opens those of the three standard streams that are closed as the null device, so that no file

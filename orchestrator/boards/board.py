@@ -23,7 +23,7 @@ import numpy as np
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base import interrupt
-from hapticlink.orchestrator.base.arrays import Matrix, Vector
+from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.boards.driver import DRIVERS, DeviceDriver, Silent, Wiring
 from hapticlink.orchestrator.boards.safe_torques import SafeTorques
@@ -224,9 +224,6 @@ class Board(Instance):
         self.place.time = end
         self.place.steps += 1
 
-    def finish(self) -> None:
-        pass
-
     def _send(self, torques: Sequence[float]) -> None:
         assert self._driver
         self._sent_at, self._rests = time.perf_counter(), False
@@ -297,9 +294,6 @@ class Board(Instance):
         return None
 
     # --- what no hardware does ------------------------------------------------------------
-
-    def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
-        return None
 
     def save(self, slot: int = 0) -> None:
         raise self._fault("hardware has no state that could be saved", self.time)

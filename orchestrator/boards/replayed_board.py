@@ -17,9 +17,9 @@ MOST = 1e-9
 """Time (s) by which a recorded one may differ from that of a tick."""
 
 
-@dataclass(frozen=True)
-class BoardRecording:
-    """The `columns` by name of the table of an earlier run that has what a board put out, for the
+@dataclass(frozen=True, kw_only=True)
+class RecordedDriver(Driver):
+    """A board that is read from the `columns` by name of the table of an earlier run, for the
     outputs of an FMU. Raises InputFault where one that others read is missing."""
 
     name: str
@@ -39,11 +39,11 @@ READ = ("q", "tau_applied")
 class ReplayedBoard(Board):
     """A board in the place of which its recording is read; torques go nowhere."""
 
-    def __init__(self, recording: BoardRecording, table: Driver, *arguments: Any) -> None:
-        super().__init__(table, *arguments)
-        columns, self._begun = recording.columns, False
+    def __init__(self, recorded: RecordedDriver, *arguments: Any) -> None:
+        super().__init__(recorded, *arguments)
+        columns, self._begun = recorded.columns, False
         self._times = columns["time"]
-        names = [f"{recording.name}.{s.name}" for s in self.description.outputs]
+        names = [f"{recorded.name}.{s.name}" for s in self.description.outputs]
         self._rows = np.stack([columns[name] for name in names], axis=1)
 
     def begin(self) -> None:

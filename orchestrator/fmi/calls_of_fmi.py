@@ -296,9 +296,6 @@ class InProcess(Instance):
         """Ends a step whose doStep, called by the compiled loop, returned `status`."""
         self.stepped(self._judge_status(status, self.place.begin))
 
-    def finish(self) -> None:
-        """Nothing to wait for: `step` returns after doStep."""
-
     # --- FMU states: in slots, and as bytes ---------------------------------------------------
 
     def save(self, slot: int = 0) -> None:
@@ -356,9 +353,6 @@ class InProcess(Instance):
         cause = error.__cause__ or error
         what = f"{call} left {type(cause).__name__} behind: {cause}"
         return self._fault(what, self.time)
-
-    def dismiss(self) -> None:
-        """Nothing to do in advance: `close` is quick."""
 
     def abandon(self) -> None:
         self._status = FATAL

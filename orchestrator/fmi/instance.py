@@ -15,7 +15,7 @@ from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Diverged, Fault, FmuFault
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.fmi.fault_policy import Faults
-from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.fmi.units import factors_and_offsets
 from hapticlink.orchestrator.fmi.variables import CONTINUOUS, Scalar
 
 if TYPE_CHECKING:  # a worker process need not load what reads scenes
@@ -154,12 +154,8 @@ class Instance(ABC):
         self.row_due = ctypes.c_int64(1)
         self._counted = False
         self.bounds = OutputBounds(description, outputs)
-        conversions = [s.conversion for s in description.outputs]
-        self.converted: Matrix | None = None
-        """Factors and offsets of its outputs, where these are in other units than their FMU's."""
-        if any(c != SAME for c in conversions):
-            self.converted = np.array([[c.factor for c in conversions],
-                                       [c.offset for c in conversions]])  # fmt: skip
+        self.converted = factors_and_offsets([s.conversion for s in description.outputs])
+        """Of its outputs, where these are in other units than their FMU's."""
         self._folder = folder
 
     def __enter__(self) -> Instance:
@@ -242,10 +238,10 @@ class Instance(ABC):
         """A function that sets `scalars` to the values at the indices `places` of a signal
         vector."""
 
-    @abstractmethod
     def jacobian(self, outputs: Sequence[Scalar], inputs: Sequence[Scalar]) -> Matrix | None:
         """The Jacobian (outputs, inputs) at the current state, by directional derivatives; None if
         the FMU does not provide them."""
+        return None
 
     @abstractmethod
     def enter_initialization(self, start_time: float, stop_time: float) -> None:
@@ -270,9 +266,8 @@ class Instance(ABC):
     def step(self, time: float, end: float, size: float) -> None:
         """Begin a doStep from `time` over `size`, to `end` (s)."""
 
-    @abstractmethod
-    def finish(self) -> None:
-        """Wait until the step has been taken."""
+    def finish(self) -> None:  # noqa: B027
+        """Wait until the step has been taken, where `step` has only begun it."""
 
     @abstractmethod
     def save(self, slot: int = 0) -> None:
@@ -290,23 +285,21 @@ class Instance(ABC):
     def deserialize(self, state: bytes) -> None:
         """Restore an FMU state from bytes that `serialized` gave, or that were made of them."""
 
-    @abstractmethod
-    def dismiss(self) -> None:
-        """Start closing without waiting for it."""
+    def dismiss(self) -> None:  # noqa: B027
+        """Start closing without waiting for it, where it takes long."""
 
-    @abstractmethod
-    def abandon(self) -> None:
+    def abandon(self) -> None:  # noqa: B027
         """The instance is in a call that does not return: it is not called again."""
 
-    @abstractmethod
     def close(self) -> FmuFault | None:
         """Terminate if FMI allows it in the current state, free, unload, and remove the folder.
         Returns the fault of an FMU that fails in this."""
+        return None
 
     def _convert(self, places: Sequence[int] | slice = slice(None)) -> None:
         """Convert outputs that were just read."""
         if self.converted is not None:
-            factors, offsets = self.converted[:, places]
+            factors, offsets = (each[places] for each in self.converted)
             self.outputs[places] = factors * self.outputs[places] + offsets
 
     def _logged(self) -> Sequence[str]:

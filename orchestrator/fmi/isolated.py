@@ -18,7 +18,7 @@ from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import AsksToEnd, FmuFault
 from hapticlink.orchestrator.fmi.instance import Instance
-from hapticlink.orchestrator.fmi.units import SAME
+from hapticlink.orchestrator.fmi.units import factors_and_offsets
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.fmi.worker_process import Died, Process
 
@@ -119,14 +119,14 @@ class Isolated(Instance):
     def connect(self, scalars: Sequence[Scalar], places: Sequence[int]) -> Callable[[Vector], None]:
         """The function queues the values, converted, for the setter `key` of the worker."""
         key = self._ask("connect", [s.name for s in scalars])
-        conversions = [s.conversion for s in scalars]
-        where, same = np.array(places, dtype=np.intp), all(c == SAME for c in conversions)
-        factors = np.array([c.factor for c in conversions])
-        offsets = np.array([c.offset for c in conversions])
+        where = np.array(places, dtype=np.intp)
+        converted = factors_and_offsets([s.conversion for s in scalars])
 
         def set_from(signals: Vector) -> None:
             if not self.ended:
-                values = signals[where] if same else signals[where] * factors + offsets
+                values = signals[where]
+                if converted is not None:
+                    values = values * converted[0] + converted[1]
                 self._pending.append((key, values.tobytes()))
 
         return set_from

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.instance import StepState
 from hapticlink.orchestrator.fmi.transfer import Transfer
-from hapticlink.orchestrator.fmi.units import SAME, Linear
+from hapticlink.orchestrator.fmi.units import Linear, factors_and_offsets
 
 Setting = tuple[Vector, NDArray[np.intp] | None, Sequence[Transfer]]
 """`whole`, `into` and `transfers` of a Setter."""
@@ -41,9 +41,8 @@ class Setter:
         self.values = self.whole if self.into is None else np.zeros(len(where))
         self.factors: Vector | None = None
         self.offsets: Vector | None = None
-        if any(c != SAME for c in conversions):
-            self.factors = np.array([c.factor for c in conversions])
-            self.offsets = np.array([c.offset for c in conversions])
+        if converted := factors_and_offsets(conversions):
+            self.factors, self.offsets = converted
 
     def __call__(self, signals: Vector) -> None:
         if self.place.ended:

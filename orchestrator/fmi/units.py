@@ -13,8 +13,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+import numpy as np
+
 from hapticlink.components.ports import BASES
 from hapticlink.fmus.units import base_unit
+from hapticlink.orchestrator.base.arrays import Vector
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,13 @@ class Linear:
 
 
 SAME = Linear()
+
+
+def factors_and_offsets(conversions: Sequence[Linear]) -> tuple[Vector, Vector] | None:
+    """Those of all, (k,); None where nothing is converted."""
+    if all(c == SAME for c in conversions):
+        return None
+    return np.array([c.factor for c in conversions]), np.array([c.offset for c in conversions])
 
 
 def conversion(source: Unit | None, target: Unit | None, relative: bool = False) -> Linear:

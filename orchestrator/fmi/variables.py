@@ -24,7 +24,7 @@ of both, Clock, whose number is how often it has been active, and those that are
 CONTINUOUS = ("Real", "Float64", "Float32")
 """Those of floating point."""
 WRITTEN = ("String", "Binary")
-"""The FMI types that are no numbers: signals have the number of the text (`texts`)."""
+"""The FMI types that are no numbers: signals have the number of the text (`transfer`)."""
 _CALLED = {("2", "Enumeration"): "Integer", ("3", "Enumeration"): "Int64"}
 _DERIVATIVE = re.compile(r"der\((.+)\)")
 _ENTRY = re.compile(r"\[[\d, ]+\]$")

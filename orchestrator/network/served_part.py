@@ -53,8 +53,8 @@ def place_remote_fmus(system: System, scene: Scene, remote: Servers) -> System:
     }
     if served:
         read_key(remote.key)  # raises what is missing before anything runs
-    fmus = tuple(replace(fmu, served=served.get(fmu.name)) for fmu in system.fmus)
-    return replace(system, fmus=fmus)
+    fmus = (replace(u, in_its_place=served.get(u.name, u.in_its_place)) for u in system.fmus)
+    return replace(system, fmus=tuple(fmus))
 
 
 def require_address(address: str) -> str:

@@ -122,7 +122,7 @@ def describe_hold(connection: Connection, signals: SignalVector) -> HoldParts:
         gains=_gains(connection, system) if kind.needs == "coupling" else None,
         parts=system.coupling.substeps.get(connection.target, 1),
         spring=of,
-        row=of.ports.index(f"{connection.target}.{connection.target_port}") if of else 0,
+        row=of.ports.index(connection.to) if of else 0,
     )
 
 

@@ -6,10 +6,12 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from functools import partial
 
+from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.boards.board import Board
+from hapticlink.orchestrator.boards.replayed_board import RecordedDriver, ReplayedBoard
 from hapticlink.orchestrator.fmi.description import NEEDS_TOOL
 from hapticlink.orchestrator.fmi.in_process import in_process
 from hapticlink.orchestrator.fmi.instance import Instance
@@ -18,7 +20,7 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.network.remote_fmu import Remote
 from hapticlink.orchestrator.run.python_modules import clashes, find_bundled
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Connection, Fmu, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, ServedAt, System
 
 
 def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
@@ -70,21 +72,25 @@ class LoadedFmus:
         if not in_real_time:
             refuse_hardware(system.fmus)
         self.system, self.signals = system, SignalVector(system)
-        self.isolated = find_isolated(fmu for fmu in system.fmus if not fmu.stand_in)
+        self.isolated = find_isolated(u for u in system.fmus if not callable(u.in_its_place))
         self.instances: dict[str, Instance] = {}
         for fmu in system.fmus:
             interrupt.raise_if_interrupted()
             outputs = self.signals.values[self.signals.fmu(fmu.name)]
             opening: Callable[..., Instance]
-            if fmu.stand_in:
-                opening = fmu.stand_in
-            elif fmu.served:
-                opening = partial(Remote, fmu.served)
-            elif fmu.driver:
-                opening = partial(Board, fmu.driver)
-            else:
-                isolated = fmu.name in self.isolated
-                opening = Isolated if isolated else in_process(fmu.description)
+            match fmu.in_its_place:
+                case None if fmu.name in self.isolated:
+                    opening = Isolated
+                case None:
+                    opening = in_process(fmu.description)
+                case ServedAt() as at:
+                    opening = partial(Remote, at)
+                case RecordedDriver() as driver:
+                    opening = partial(ReplayedBoard, driver)
+                case Driver() as driver:
+                    opening = partial(Board, driver)
+                case make:
+                    opening = make
             instance = opening(fmu.name, fmu.description, outputs, fmu.starts, system.faults)
             instance.recorded_only, instance.log_path = fmu.recorded_only, log_path
             own = fmu.description.block is not None or system.coupling.scheme == "iterated"

@@ -12,16 +12,14 @@ import json
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.boards.replayed_board import BoardRecording, ReplayedBoard
+from hapticlink.orchestrator.boards.replayed_board import RecordedDriver
 from hapticlink.orchestrator.network.served_part import OF_A_RUN
 from hapticlink.orchestrator.results import run_record
 from hapticlink.orchestrator.results.read_results import read_table
@@ -31,7 +29,7 @@ from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.system import Fmu, System
+from hapticlink.orchestrator.system.system import System
 
 END = 1.0
 """Seconds behind the last recorded arrival after which none is waited for."""
@@ -128,13 +126,12 @@ class RecordedArrivals(RealTimeRun):
             return system
         if system.recording.every != 1:
             raise InputFault(f"{self._folder}: a board needs all rows: run with record.every = 1")
-        columns = self._table
-
-        def replayed(fmu: Fmu, driver: Driver) -> Fmu:
-            recording = BoardRecording(fmu.name, columns)
-            return replace(fmu, stand_in=partial(ReplayedBoard, recording, driver))
-
-        fmus = (replayed(u, u.driver) if u.driver else u for u in system.fmus)
+        fmus = []
+        for fmu in system.fmus:
+            if fmu.driver:
+                own = vars(fmu.driver) | {"port": "", "name": fmu.name, "columns": self._table}
+                fmu = replace(fmu, in_its_place=RecordedDriver(**own))
+            fmus.append(fmu)
         return replace(system, fmus=tuple(fmus))
 
     def _require_arrivals(self, simulation: Simulation, loop: CompiledLoop) -> None:

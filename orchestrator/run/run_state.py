@@ -177,7 +177,7 @@ def _capture_fmu(fmu: Fmu, simulation: Simulation) -> dict[str, Any]:
         "guid": fmu.description.guid,
         "clock": fmu.clock,
         "timing": fmu.description.timing,
-        "starts": starts_by_name(fmu),
+        "starts": fmu.start_values,
         "state": instance.serialized(),
         "place": {name: getattr(instance.place, name) for name in PLACE},
         "outputs": dict(zip(names, instance.outputs.tolist(), strict=True)),
@@ -188,10 +188,6 @@ def _capture_fmu(fmu: Fmu, simulation: Simulation) -> dict[str, Any]:
     if isinstance(instance, InProcessWithEvents) and instance.has_events:
         found["pending"] = instance.saved_events()
     return found
-
-
-def starts_by_name(fmu: Fmu) -> dict[str, Any]:
-    return {scalar.name: value for scalar, value in fmu.starts}
 
 
 def _capture_hold(hold: CompiledHold) -> dict[str, Any]:
@@ -357,7 +353,7 @@ def _restore_changes(state: RunState, simulation: Simulation) -> None:
 def new_starts(state: RunState, system: System) -> Iterator[InputChange]:
     """What sets the start values that differ from those of the state."""
     for u in system.fmus:
-        before, now = state.content["fmus"][u.name]["starts"], starts_by_name(u)
+        before, now = state.content["fmus"][u.name]["starts"], u.start_values
         by_name = {s.name: s for s in (*u.description.scalars, *(s for s, _ in u.starts))}
         for name in sorted({*before, *now} & by_name.keys()):  # of one FMU: all of them
             value = now.get(name, by_name[name].start)

@@ -13,6 +13,7 @@ from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.toml_keys import Path
 
 
 def argument_fields(arguments: Iterable[inspect.Parameter]) -> list[tuple[str, Any, Any]]:
@@ -29,6 +30,11 @@ def read_strictly(record: Any, table: Any) -> Any:
     """The record of a table. Raises pydantic.ValidationError, whose paths begin with "table"."""
     text = to_json({"table": table}, inf_nan_mode="constants")
     return _reader(record).validate_json(text).table
+
+
+def errors_at(path: Path, error: pydantic.ValidationError) -> list[Any]:
+    """The errors of `read_strictly` in the table at `path` of a scene."""
+    return [{**e, "loc": (*path, *e["loc"][1:])} for e in error.errors(include_url=False)]
 
 
 @cache

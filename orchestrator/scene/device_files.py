@@ -5,21 +5,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 from hapticlink.components.specs.device import Device, DeviceBody
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import InputFault, near, shorten, unknown
-from hapticlink.orchestrator.scene.find_scene import list_shipped
+from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.merge import merge
 from hapticlink.orchestrator.scene.toml_keys import (
-    LARGEST,
     Path,
     Place,
     Problem,
+    entries,
     read_document,
+    tables_of_users,
     value,
 )
 
@@ -46,41 +46,12 @@ class DeviceBodyTable(DeviceBody):
     """The body whose mass, inertia and centre it has, where it does not say otherwise."""
 
 
-def list_devices() -> dict[str, Any]:
-    """The device files that are shipped with the package, by name."""
-    return list_shipped("hapticlink.scenes.devices")
-
-
-@cache
-def _read_shipped(name: str) -> str:
-    text: str = list_devices()[name].read_text(encoding="utf-8")
-    return text
-
-
-def find_device(name: str, folder: FilePath | None = None) -> tuple[str, str, FilePath | None]:
-    """Name, text and folder of a device file: a path relative to `folder`, or the name of a shipped
-    one, which has no folder. Raises InputFault where there is none."""
-    path, known = (folder or FilePath()) / name, list_devices()
-    if text_files.exists(path):
-        return str(path), text_files.read_text(path, "a device", LARGEST), path.parent
-    if name in known:
-        return name, _read_shipped(name), None
-    raise InputFault(f"{shorten(name)}: neither a file nor a shipped device; {near(name, known)}")
-
-
 def device_tables(data: Mapping[str, Any]) -> Iterator[tuple[Path, dict[str, Any]]]:
     """The tables of all devices of a scene, with their paths."""
-    if isinstance(data.get("device"), dict):
-        yield ("device",), data["device"]
-    further = data.get("devices")
-    for name, table in further.items() if isinstance(further, dict) else ():
+    paths: list[Path] = [("fmu", i, "settings", "device") for i in range(len(entries(data, "fmu")))]
+    for path, table in (*tables_of_users(data, "device"), *((p, value(data, p)) for p in paths)):
         if isinstance(table, dict):
-            yield ("devices", name), table
-    fmus = data.get("fmu")
-    for i, fmu in enumerate(fmus if isinstance(fmus, list) else ()):
-        table = value(fmu, ("settings", "device"))
-        if isinstance(table, dict):
-            yield ("fmu", i, "settings", "device"), table
+            yield path, table
 
 
 def is_choice(names: tuple[str, ...]) -> bool:
@@ -127,8 +98,8 @@ def put_device_files(data: Mapping[str, Any], written: Mapping[Path, Place]) -> 
             for key, place in where.items()
             if not (replaced and any(key[:i] in replaced for i in range(1, len(key) + 1)))
         }
-        for key, entries in named.items():
-            for entry, changes in entries.items():
+        for key, changed in named.items():
+            for entry, changes in changed.items():
                 index = _index(whole.get(key), entry)
                 if index is None or not isinstance(changes, dict):
                     known = [str(e.get("name")) for e in whole.get(key, ())]
@@ -169,7 +140,8 @@ def _read(
         raise InputFault(f"{shorten(repr(name))}: write a device's name or path")
     if depth >= MAX_EXTENDED:
         raise InputFault(f"{shorten(name)}: the last of {MAX_EXTENDED} files, each over the next")
-    file, text, where = find_device(name, folder)
+    _, text, where = find_scene(name, folder, "device")
+    file = str(where / FilePath(name).name) if where else name
     try:
         tables, own = read_document(text)
     except ValueError as error:
@@ -187,10 +159,9 @@ def put_likes(data: Mapping[str, Any]) -> list[Problem]:
     with the names."""
     problems: list[Problem] = []
     for path, table in device_tables(data):
-        bodies = table.get("body")
-        entries = [b for b in bodies if isinstance(b, dict)] if isinstance(bodies, list) else []
-        own = {b["name"]: b for b in entries if isinstance(b.get("name"), str) and "like" not in b}
-        for i, body in enumerate(entries):
+        bodies = [b for b in entries(table, "body") if isinstance(b, dict)]
+        own = {b["name"]: b for b in bodies if isinstance(b.get("name"), str) and "like" not in b}
+        for i, body in enumerate(bodies):
             if "like" not in body:
                 continue
             model = body.pop("like")

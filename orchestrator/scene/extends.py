@@ -17,6 +17,7 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import (
     Path,
     Place,
+    entries,
     flatten,
     flatten_path,
     parts,
@@ -146,5 +147,4 @@ def with_family(data: dict[str, Any]) -> dict[str, Any]:
 
 def tables_of(data: Mapping[str, Any], key: str) -> list[dict[str, Any]]:
     """The entries of [[key]] that are tables; anything else is reported by the schema."""
-    entries = data.get(key)
-    return [e for e in entries if isinstance(e, dict)] if isinstance(entries, list) else []
+    return [entry for entry in entries(data, key) if isinstance(entry, dict)]

@@ -15,9 +15,9 @@ import pydantic
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.holds import HOLDS, HoldRow, parameters_in
-from hapticlink.orchestrator.scene.argument_records import argument_fields, read_strictly
+from hapticlink.orchestrator.scene.argument_records import argument_fields, errors_at, read_strictly
 from hapticlink.orchestrator.scene.overrides import toml
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem, value
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, entries, value
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +45,9 @@ def _record(kind: Any) -> Any:
 def find_hold_tables(data: Any) -> Iterator[tuple[Path, Any]]:
     """Path and content of each hold of a scene's `data` that has, or could have, parameters."""
     named = value(data, ("holds",))
-    wires = value(data, ("connection",))
     paths: list[Path] = [("hold",), ("downsampling",)]
     paths += [("holds", name) for name in (named if isinstance(named, dict) else ())]
-    paths += [
-        ("connection", i, "hold") for i in range(len(wires) if isinstance(wires, list) else 0)
-    ]
+    paths += [("connection", i, "hold") for i in range(len(entries(data, "connection")))]
     for path in paths:
         found = value(data, path)
         if isinstance(found, dict) or (isinstance(found, str) and _may_have_parameters(found)):
@@ -76,8 +73,7 @@ def read_hold_tables(data: Any) -> tuple[list[Any], list[Problem]]:
                 continue
             holder[path[-1]] = _name(read_strictly(record, table), table)
         except pydantic.ValidationError as error:
-            located = error.errors(include_url=False)
-            errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in located]
+            errors += errors_at(path, error)
         except ValueError as error:
             holder[path[-1]] = "zoh"
             wrong.append((path, f"{found}: {error}: write {{ type = NAME, PARAMETER = VALUE }}"))

@@ -83,7 +83,7 @@ def _write(data: dict[str, Any]) -> bytes:
 
 
 def from_source(source: Source) -> Scene:
-    """The scene of the tables of `source`, changed by its options; raises as `read` does."""
+    """The scene of the tables of `source`, changed by its options; raises as `read_scene` does."""
     data, set_by, read_from = plain(dict(source.tables)), dict(source.set_by), source
     # Options of a family or a device file come first, since others may change the bodies that it
     # expands to.

@@ -25,6 +25,8 @@ from hapticlink.fmus.errors import InvalidUnit
 from hapticlink.fmus.units import base_unit
 from hapticlink.orchestrator.base import text_files
 from hapticlink.orchestrator.base.errors import unknown
+from hapticlink.orchestrator.scene.toml_keys import Path as Keys
+from hapticlink.orchestrator.scene.toml_keys import entries, tables_of_users, value
 
 LARGEST = 2**26
 """Bytes: 10 min at 1 kHz, of four columns."""
@@ -58,17 +60,12 @@ _KEYS = {field.name for field in fields(RecordedTable)}
 
 def find_recorded_tables(
     data: Mapping[str, Any],
-) -> Iterator[tuple[tuple[str | int, ...], dict[str, Any], str]]:
+) -> Iterator[tuple[Keys, dict[str, Any], str]]:
     """The tables of hands, drives and signals of which `table` or `target` is a recorded log, each
     with its path in the scene and that key."""
-    holders: list[tuple[tuple[str | int, ...], Any]] = [(("hand",), data.get("hand"))]
-    if isinstance(hands := data.get("hands"), dict):
-        holders += [(("hands", name), hand) for name, hand in hands.items()]
-    linkage = data.get("linkage")
-    joints = linkage.get("joint") if isinstance(linkage, dict) else None
-    for i, joint in enumerate(joints if isinstance(joints, list) else ()):
-        if isinstance(joint, dict):
-            holders.append((("linkage", "joint", i, "drive"), joint.get("drive")))
+    holders = tables_of_users(data, "hand")
+    for i, joint in enumerate(entries(data, "linkage", "joint")):
+        holders.append((("linkage", "joint", i, "drive"), value(joint, ("drive",))))
     holders += [((*path, key), table.get(key)) for path, table, key in signal_tables(data)]
     for path, holder in holders:
         for key in ("table", "target"):
@@ -79,12 +76,11 @@ def find_recorded_tables(
 
 def signal_tables(
     data: Mapping[str, Any],
-) -> Iterator[tuple[tuple[str | int, ...], dict[str, Any], str]]:
+) -> Iterator[tuple[Keys, dict[str, Any], str]]:
     """The tables that may have the settings of the block `signal`, with their paths and the key of
     these."""
     for name, key in (("fmu", "settings"), ("connection", "from")):
-        entries = data.get(name)
-        for i, entry in enumerate(entries if isinstance(entries, list) else ()):
+        for i, entry in enumerate(entries(data, name)):
             if isinstance(entry, dict) and isinstance(entry.get(key), dict):
                 yield (name, i), entry, key
 

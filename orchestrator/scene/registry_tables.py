@@ -13,24 +13,19 @@ import pydantic
 
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.orchestrator.scene import hold_tables
-from hapticlink.orchestrator.scene.argument_records import argument_fields, read_strictly
+from hapticlink.orchestrator.scene.argument_records import argument_fields, errors_at, read_strictly
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem, value
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, entries, value
 
 
 def _tables(data: Any) -> Iterator[tuple[Path, Any]]:
     """Path and content of every such table in a scene's `data`; missing settings are added as an
     empty table."""
-    for i, fmu in enumerate(_list(data, "fmu")):
+    for i, fmu in enumerate(entries(data, "fmu")):
         if isinstance(fmu, dict) and "block" in fmu:
             yield ("fmu", i, "settings"), fmu.setdefault("settings", {})
-    for i, force in enumerate(_list(data, "linkage", "force")):
+    for i, force in enumerate(entries(data, "linkage", "force")):
         yield ("linkage", "force", i), force
-
-
-def _list(data: Any, *path: str) -> list[Any]:
-    entries = value(data, path)
-    return entries if isinstance(entries, list) else []
 
 
 def record_of(path: Path, data: Any) -> Any:
@@ -75,8 +70,7 @@ def read_registry_tables(data: Any) -> tuple[dict[Path, Any], list[Any], list[Pr
         try:
             records[path] = read_strictly(record, table)
         except pydantic.ValidationError as error:
-            found = error.errors(include_url=False)
-            errors += [{**e, "loc": (*path, *e["loc"][1:])} for e in found]
+            errors += errors_at(path, error)
     return records, errors, wrong
 
 
@@ -99,7 +93,7 @@ def _of_a_force(path: Path, table: Any, names: set[Any]) -> Iterator[Problem]:
 
 
 def put_registry_tables(scene: Scene, records: Mapping[Path, Any]) -> Scene:
-    """The scene with such tables replaced by the records that `read` returned."""
+    """The scene with such tables replaced by the records that `read_registry_tables` gave."""
 
     def settings(i: int) -> dict[str, Any]:
         record = records["fmu", i, "settings"]

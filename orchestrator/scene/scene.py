@@ -269,7 +269,7 @@ class Scene:
     @property
     def named_holds(self) -> dict[str, str]:
         """The holds of single connections, of [holds] and of [[connection]] tables."""
-        own = {f"{w.from_} -> {w.to}": w.hold for w in self.connection if w.hold}
+        own = {w.name: w.hold for w in self.connection if w.hold}
         return {**self.holds, **own}
 
     def tables(self) -> dict[str, Any]:

@@ -102,6 +102,10 @@ class Wire:
     convert: bool = True
     """Whether to convert between the units of the two ends."""
 
+    @property
+    def name(self) -> str:
+        return f"{self.from_} -> {self.to}"
+
 
 RecordRate = Annotated[float, Quantity("Hz", gt=0, le=1_000_000)]
 

@@ -213,3 +213,21 @@ def value(data: Any, path: Path) -> Any:
         except (KeyError, IndexError, TypeError):
             return None
     return data
+
+
+def entries(data: Any, *path: str) -> list[Any]:
+    """The entries of an array of nested tables; none where there is no array."""
+    found = value(data, path)
+    return found if isinstance(found, list) else []
+
+
+def path_of_user(table: str, user: str) -> Path:
+    """Where a scene has a table of a user: [device], or [devices.NAME] of a further one."""
+    return (f"{table}s", user) if user else (table,)
+
+
+def tables_of_users(data: Any, table: str) -> list[tuple[Path, Any]]:
+    """Path and content of what a scene has in the place of such tables."""
+    further = value(data, (f"{table}s",))
+    users = ("", *(further if isinstance(further, dict) else ()))
+    return [(path, value(data, path)) for path in (path_of_user(table, user) for user in users)]

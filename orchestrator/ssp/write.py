@@ -78,7 +78,7 @@ def structure(scene: Scene, system: System, name: str) -> bytes:
     elements = SubElement(top, f"{{{SSD}}}Elements")
     for unit in system.fmus:
         step_sizes.of_component(_component(elements, unit, version), system, unit)
-    wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
+    wires = {w.name: w for w in scene.connection}
     lines = [c for c in system.connections if not c.to_parameter]
     variable = {
         (unit.name, s.name): (name, s.indices if len(entries) > 1 else ())
@@ -136,7 +136,7 @@ def _component(elements: Element, unit: Fmu, version: str) -> Element:
         values = SubElement(binding, f"{{{SSD}}}ParameterValues")
         set_ = SubElement(values, f"{{{SSV}}}ParameterSet", version=version, name="start")
         parameters = SubElement(set_, f"{{{SSV}}}Parameters")
-    given = {scalar.name: value for scalar, value in unit.starts}
+    given = unit.start_values
     started = {n: e for n, e in variables.items() if any(s.name in given for s in e)}
     for name, entries in started.items():
         text = " ".join(_text(s, given.get(s.name, s.start)) for s in entries)
@@ -213,7 +213,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
         | ({"derivatives": derivatives[u.name]} if u.name in derivatives else {})
         for u in system.fmus
     }
-    wires = {f"{w.from_} -> {w.to}": w for w in scene.connection}
+    wires = {w.name: w for w in scene.connection}
     tables["connection"] = [
         _row(c, wires.get(c.name)) for c in system.connections if c.to_parameter
     ]
@@ -222,7 +222,7 @@ def _rest(scene: Scene, system: System) -> dict[str, Any]:
 
 def _row(c: Connection, wire: Wire | None) -> dict[str, Any]:
     """A connection as a row of [[connection]]; its own hold is in [holds]."""
-    row = {"from": f"{c.source}.{c.source_port}", "to": f"{c.target}.{c.target_port}"}
+    row = {"from": c.from_, "to": c.to}
     if not wire:
         return row
     return row | {"factor": wire.factor, "offset": wire.offset, "convert": wire.convert}

@@ -132,12 +132,12 @@ def _with_springs(
             reason = springs.why_unlimited(c, energy.springs, connections, fmus)
         elif c.needs == "coupling" and energy.coupling(c, connections) is None:
             reason = (
-                f"{c.source}.{c.source_port} is no force of a spring-damper both ends of which are "
+                f"{c.from_} is no force of a spring-damper both ends of which are "
                 "connected and move with a known mobility (docs/holds.md); take 'half-lead'"
             )
         elif c.needs == "reaction" and energy.coupling_beside(c, connections) is None:
             reason = (
-                f"beside {c.target}.{c.target_port} acts no force of a spring-damper both ends of "
+                f"beside {c.to} acts no force of a spring-damper both ends of "
                 "which are connected and move with a known mobility (docs/holds.md); take "
                 "'half-lead'"
             )
@@ -190,7 +190,7 @@ def why_unsuitable(
     if needs == "power" and not carries_power(c, power):
         return (
             f"it is not a declared power connection: write a [[power]] that pairs the effort "
-            f"{c.target}.{c.target_port} with a displacement (docs/passivity.md, Energy), or take "
+            f"{c.to} with a displacement (docs/passivity.md, Energy), or take "
             "another hold"
         )
     return None

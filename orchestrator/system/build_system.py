@@ -31,7 +31,7 @@ from hapticlink.orchestrator.scene.conditions import Condition, parse_condition
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.scene.toml_keys import Path as Keys
-from hapticlink.orchestrator.scene.toml_keys import Problem
+from hapticlink.orchestrator.scene.toml_keys import Problem, path_of_user
 from hapticlink.orchestrator.system import (
     checks,
     fmu_tables,
@@ -261,12 +261,13 @@ def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
     if user is None or not (driver := driver_of(scene, user)):
         return fmu
     motors, encoders = (len(fmu.description.port(*port)) for port in ENDS)
-    table: Keys = ("devices", user, "driver") if user else ("device", "driver")
+    table = (*path_of_user("device", user), "driver")
     problems += (((*table, key), why) for key, why in find_misfits(driver, motors, encoders))
     most = driver.torque_limit or scene.all_devices[user].torque_limit
     rate = driver.torque_rate or most / TORQUE_RISE
     driver = replace(driver, torque_limit=most, torque_rate=rate)
-    return replace(fmu, description=describe_board(fmu.description), hardware=True, driver=driver)
+    about = describe_board(fmu.description)
+    return replace(fmu, description=about, hardware=True, in_its_place=driver)
 
 
 def _started(fmu: Fmu, block: BlockPlan) -> Fmu:

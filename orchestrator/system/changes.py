@@ -79,7 +79,7 @@ def check_change(
     why = why_unsuitable(new.hold or "", new, system.fmu, system.energy.power, False)
     if system.coupling.scheme == "iterated":
         why = "steps are repeated"
-    on_force = any(f"{c.source}.{c.source_port}" == s.force for s in system.energy.springs)
+    on_force = any(c.from_ == s.force for s in system.energy.springs)
     on_force = on_force and any(d.needs == "spring" for d in system.connections)
     if on_force or "spring" in (c.needs, new.needs):
         why = "holds of a spring share its energy: take `reset`"

@@ -33,7 +33,7 @@ def check_system(scene: Scene, system: System) -> Iterator[Problem]:
         for c in (c for c in held if key in names(c)):
             source = system.fmu[c.source].description
             if why := why_unsuitable(kind, [source.unit(s) for s in c.outputs]):
-                message = f"{c.source}.{c.source_port} {why}; take another kind, or leave it out"
+                message = f"{c.from_} {why}; take another kind, or leave it out"
                 yield ("kinds", key), message
     yield from _check_holds(scene, system)
     plants = [u.name for u in system.fmus if not u.sampled]
@@ -63,7 +63,7 @@ NOWHERE = {
 def _check_holds(scene: Scene, system: System) -> Iterator[Problem]:
     """A finding for each requested hold that does not fit, at its key in the scene. For a default
     that fits no connection: one for each connection that sets a spring, or else a single one."""
-    wires = {f"{w.from_} -> {w.to}": i for i, w in enumerate(scene.connection) if w.hold}
+    wires = {w.name: i for i, w in enumerate(scene.connection) if w.hold}
     asked, needs = [r for r in system.refused if r.key], HOLDS[scene.hold].needs or ""
     default = [r for r in asked if r.key == "hold" and r.hold == scene.hold and needs in NOWHERE]
     sets = system.energy.springs if needs == "spring" else ()

@@ -13,6 +13,7 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
+from hapticlink.components.ports import STEP_SIZE
 from hapticlink.fmus.blocks import Starts, find_block, has_compiled
 from hapticlink.fmus.cache import folder, remove_locks
 from hapticlink.fmus.errors import CompilerError, FmuError
@@ -23,7 +24,7 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.fmi.process_cache import MAX_UNPACKED, File, file_at
 from hapticlink.orchestrator.scene.blocks import BlockPlan, Blocks
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.system.step_sizes import STEP_SIZE, sizes
+from hapticlink.orchestrator.system.step_sizes import sizes
 
 LOG = logging.getLogger(__name__)
 """Says, at level INFO, which block is begun to be built, or taken from the cache."""

@@ -17,7 +17,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 def names(c: Connection) -> tuple[str, str, str]:
     """The names by which a scene may refer to a connection, the most precise first."""
-    return (c.name, f"{c.target}.{c.target_port}", f"{c.source}.{c.source_port}")
+    return (c.name, c.to, c.from_)
 
 
 def between_plants(c: Connection, fmus: Mapping[str, Fmu]) -> bool:

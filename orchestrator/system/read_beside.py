@@ -39,7 +39,7 @@ def read_beside(c: Connection, system: System) -> tuple[Beside, ...]:
 
 def _ends(of: SetSpring, system: System) -> tuple[Beside, ...]:
     """Far and near end of a coupling, their rates, and the mobility."""
-    into = {f"{i.target}.{i.target_port}": i for i in system.connections}
+    into = {i.to: i for i in system.connections}
     return tuple(Beside(i, bool(i.hold)) for i in (into[end] for end in of.ends))
 
 

@@ -49,7 +49,7 @@ def replacements(
                 all(port in known.get(fmu, ()) for fmu, port in ends) for known in (before, ports)
             ]
             if name in (ends[0][0], ends[1][0]) and there == [True, False]:
-                yield f"{row.from_} -> {row.to}"
+                yield row.name
 
     def unfed(name: str) -> Iterator[str]:
         fed = {s.name for c in system.connections if c.target == name for s in c.inputs}

@@ -21,7 +21,7 @@ NEVER_LATE = (
 
 def spring(c: Connection, springs: Iterable[SetSpring]) -> SetSpring | None:
     """The spring whose set position or set velocity a connection feeds; None if there is none."""
-    return next((s for s in springs if _end(c) in s.ports), None)
+    return next((s for s in springs if c.to in s.ports), None)
 
 
 def find_declared_springs(
@@ -43,7 +43,7 @@ def find_declared_springs(
 
 
 def _start_values(fmu: Fmu, parameter: str) -> tuple[float, ...]:
-    given = {scalar.name: value for scalar, value in fmu.starts}
+    given = fmu.start_values
     entries = fmu.description.port(parameter, "parameter")
     return tuple(float(given.get(s.name, s.start)) for s in entries)
 
@@ -52,7 +52,7 @@ def find_limited_gains(system: System) -> set[str]:
     """The gains, `fmu.parameter`, of springs whose energy a hold limits, or whose force it takes
     for the middle of a step: it has their values at the start, so that they may not change while
     the scene runs."""
-    held = {_end(c) for c in system.connections if c.needs == "spring"}
+    held = {c.to for c in system.connections if c.needs == "spring"}
     mids = {(c.source, c.source_port) for c in system.connections if c.needs == "coupling"}
     return {
         f"{fmu.name}.{gain}"
@@ -74,11 +74,11 @@ def why_unlimited(
     own = spring(c, springs)
     if own is None:
         return (
-            f"it sets no spring whose energy is known: write a [[spring]] with {_end(c)} as its "
+            f"it sets no spring whose energy is known: write a [[spring]] with {c.to} as its "
             "set_position or set_velocity (docs/passivity.md, pspm), or take another hold"
         )
     fmu, _, name = own.position.partition(".")
-    near = next((k for k in connections if _end(k) == own.position and not k.initial), None)
+    near = next((k for k in connections if k.to == own.position and not k.initial), None)
     if near is None and not fmus[fmu].description.port(name, "output"):
         return f"the near end of its spring, {own.position}, is connected to nothing"
     if near and (near.hold or fmus[near.source].clock != fmus[near.target].clock):
@@ -88,9 +88,9 @@ def why_unlimited(
     if any(s.conversion != SAME for k in (c, near) if k for s in k.inputs):
         return f"a connection to its spring converts units: connect signals in the units of {fmu}"
     for other in connections:
-        if _end(other) in own.ports and not other.initial and other.hold != c.hold:
+        if other.to in own.ports and not other.initial and other.hold != c.hold:
             held = f"held by {other.hold!r}" if other.hold else "not held"
-            return f"{_end(other)} sets the same spring and is {held}: give both {c.hold!r}"
+            return f"{other.to} sets the same spring and is {held}: give both {c.hold!r}"
     return None
 
 
@@ -119,7 +119,3 @@ def check_springs(scene: Scene, fmus: Mapping[str, Fmu]) -> Iterator[Problem]:
             if inputs and len(values) != inputs and (values or gain == "stiffness"):
                 message = f"{len(values)} gains for the {inputs} of {s.set_position}"
                 yield ("spring", i, gain), message
-
-
-def _end(c: Connection) -> str:
-    return f"{c.target}.{c.target_port}"

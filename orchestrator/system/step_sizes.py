@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from hapticlink.components.ports import FRAME_SIZE, STEP_SIZE
 from hapticlink.orchestrator.base.signal_names import ENVIRONMENT
 from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.system.system import Fmu
-
-STEP_SIZE, FRAME_SIZE = "step_size", "frame_size"
-"""As in `components.component`, which loads CasADi."""
 
 
 def sizes(clock: str, timeline: Timeline) -> dict[str, float]:

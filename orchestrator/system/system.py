@@ -44,12 +44,18 @@ class Fmu:
     isolate: bool = False
     hardware: bool = False
     recorded_only: frozenset[str] = frozenset()
-    served: ServedAt | None = None
-    """Where it runs, if that is on another computer."""
-    driver: Driver | None = None
-    """The board in its place."""
-    stand_in: Callable[..., Any] | None = None
-    """What makes the `Instance` that runs in its place, by the arguments of one."""
+    in_its_place: ServedAt | Driver | Callable[..., Any] | None = None
+    """What runs instead: the FMU on another computer, a board, or what this makes by the arguments
+    of an `Instance`."""
+
+    @property
+    def served(self) -> ServedAt | None:
+        return at if isinstance(at := self.in_its_place, ServedAt) else None
+
+    @property
+    def driver(self) -> Driver | None:
+        """Of the board in its place."""
+        return at if isinstance(at := self.in_its_place, Driver) else None
 
     @property
     def sampled(self) -> bool:
@@ -59,6 +65,11 @@ class Fmu:
     def frames(self) -> bool:
         """Whether its outputs describe the beginning of the step at whose end they are known."""
         return self.description.timing == "frame"
+
+    @property
+    def start_values(self) -> dict[str, Any]:
+        """Its start values by name of the variable."""
+        return {scalar.name: value for scalar, value in self.starts}
 
     def starting(self, new: Starts) -> Fmu:
         """The FMU with `new` start values, in place of those that these variables have."""
@@ -87,8 +98,16 @@ class Connection:
     kind: str | None = None
 
     @property
+    def from_(self) -> str:
+        return f"{self.source}.{self.source_port}"
+
+    @property
+    def to(self) -> str:
+        return f"{self.target}.{self.target_port}"
+
+    @property
     def name(self) -> str:
-        return f"{self.source}.{self.source_port} -> {self.target}.{self.target_port}"
+        return f"{self.from_} -> {self.to}"
 
     @property
     def needs(self) -> str | None:
@@ -153,11 +172,11 @@ class EnergyPorts:
         """The spring-damper whose force a connection has, if both its ends move with a mobility
         that is known, each of these is brought by one connection, and there are no more entries
         than MOST."""
-        force, n = f"{c.source}.{c.source_port}", len(c.inputs)
+        force, n = c.from_, len(c.inputs)
         own = next((s for s in self.springs if s.force == force and all(s.ends)), None)
         if own is None or n > MOST:
             return None
-        to = {f"{k.target}.{k.target_port}": len(k.inputs) for k in connections if not k.initial}
+        to = {k.to: len(k.inputs) for k in connections if not k.initial}
         sizes = [to.get(end) for end in own.ends]
         return own if sizes == [n, n, n, n, n * n] else None
 
@@ -167,9 +186,9 @@ class EnergyPorts:
         """The spring-damper of `coupling` whose force moves what the effort of a connection does,
         beside it."""
         moved = {p.effort: p.displacement for p in self.power}
-        own = moved.get(f"{c.target}.{c.target_port}")
+        own = moved.get(c.to)
         others = (k for k in connections if k.target == c.target and k.name != c.name)
-        same = (k for k in others if own and moved.get(f"{k.target}.{k.target_port}") == own)
+        same = (k for k in others if own and moved.get(k.to) == own)
         found = (self.coupling(k, connections) for k in same)
         return next((of for of in found if of), None)
 

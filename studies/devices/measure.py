@@ -25,7 +25,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.hand import ArmHand, Hand, SpringHand
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
-from hapticlink.orchestrator.scene.device_files import list_devices
+from hapticlink.orchestrator.scene.find_scene import list_shipped
 from hapticlink.orchestrator.scene.read_and_check import read_scene
 
 SCENE = "closed-loop-ideal"
@@ -46,7 +46,9 @@ Options = dict[str, Any]
 def planar_devices() -> list[str]:
     """The shipped devices that render a planar linkage, as that of the scene."""
     alone = 'title = "a device"\nduration = 1.0\ndevice.extends = "{}"'
-    return [name for name in list_devices() if read_scene(alone.format(name)).space == PLANE]
+    return [
+        name for name in list_shipped("device") if read_scene(alone.format(name)).space == PLANE
+    ]
 
 
 def options(name: str) -> Options:

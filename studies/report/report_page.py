@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hapticlink.analysis.findings.report_premises import CHAPTER_6, describe_experiment, setting
+from hapticlink.analysis.findings.report_premises import CHAPTER_6, describe_experiment
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.scene.overrides import as_command_line
+from hapticlink.orchestrator.scene.toml_keys import parts, value
 
 HEAD = """# The report's figures, from runs of the FMUs
 
@@ -79,7 +80,7 @@ def premises(name: str, results: Results) -> str:
     of_the_report = "".join(describe_experiment(scene))
     if of_the_report:
         return f"{name}: {of_the_report}"
-    values = (f"{p.key} = {setting(scene, p.key)}" for p in CHAPTER_6)
+    values = (f"{p.key} = {value(scene, parts(p.key))}" for p in CHAPTER_6)
     return f"{name}: not an experiment of the report; {', '.join(values)}"
 
 

@@ -22,6 +22,7 @@ from hapticlink.analysis.findings.tracking import (
     count_constrained,
     find_handle,
     find_users,
+    newest,
     of_block,
     of_port,
     pose_error,
@@ -209,8 +210,7 @@ def _largest(results: Results) -> tuple[float, float, Vector, Vector] | None:
     F, times = force[HAND_WRENCH][:, : view.dimension], force["time"]
     most = np.hypot.reduce(F, axis=1)
     k = int(most.argmax())
-    row = int(np.searchsorted(handle["time"], times[k] + 1e-12, "right")) - 1
-    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][max(row, 0)]
+    pose = handle[HANDLE_POSE if HANDLE_POSE in handle else POINT_POSE][newest(handle, times[k])]
     return most[k], times[k], F[k], pose[: view.dimension]
 
 

@@ -152,7 +152,7 @@ def _gains(scene: Scene, system: System) -> dict[str, tuple[NDArray[np.float64],
             for s in fmu.description.scalars
             if s.causality == "parameter" and s.variability == "tunable" and s.port not in OTHERS
         ]
-        given = {scalar.name: value for scalar, value in fmu.starts}
+        given = fmu.start_values
         for port in dict.fromkeys(s.port for s in tunable):
             if f"{fmu.name}.{port}" in fixed:
                 continue

@@ -113,7 +113,7 @@ def to_caller() -> IO[bytes]:
 
 
 def write_message(stream: IO[bytes], message: Any) -> None:
-    """Write a message to a stream, for `read`."""
+    """Write a message to a stream, for `read_message`."""
     pickle.dump(message, stream)
     stream.flush()
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hapticlink.visualization.mechanism.marks import SHAPES, Mark, Place, reach
+from hapticlink.orchestrator.scene.toml_keys import value
+from hapticlink.visualization.mechanism.marks import SHAPES, Mark, Place
 from hapticlink.visualization.mechanism.view import PLANE_VIEW, View
 
 Points = NDArray[np.float64]
@@ -22,7 +23,7 @@ MIN_ARROW, MAX_ARROW = 3.0, 120.0
 
 def world(frame: Frame, of: Place) -> Sequence[float] | None:
     """Where a point is in the world (m), None where the frame does not have it."""
-    pose = reach(frame, of.path)
+    pose = value(frame, of.path)
     if pose is None:
         return None
     if len(of.point) > 2:  # a place, with the columns of a rotation matrix where it has a frame
@@ -82,13 +83,13 @@ def shape(mark: Mark, frame: Frame) -> Points:
     corners = np.array(SHAPES[mark.kind])
     if mark.angle is None:
         return corners
-    return _turn(reach(frame, mark.at[-1].path), corners, mark.angle)
+    return _turn(value(frame, mark.at[-1].path), corners, mark.angle)
 
 
 def vector(mark: Mark, frame: Frame, view: View = PLANE_VIEW) -> Points | None:
     """What is at the `vector` of a mark, without its moment, on the page: (2,), (k, 2) of several;
     None where the frame does not have it."""
-    found = reach(frame, mark.vector)
+    found = value(frame, mark.vector)
     if not found:
         return None
     return on_page(np.array(found)[..., : len(mark.at[0].point)], view)

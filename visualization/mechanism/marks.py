@@ -413,16 +413,6 @@ def obstacles(contacts: Contacts | None) -> Iterator[Mark]:
         yield Mark("obstacle", "area", at, GREY, width=1.5, label="enclosure")
 
 
-def reach(frame: Any, path: Path) -> Any:
-    """What is at a path in a frame, None where it is not there."""
-    for key in path:
-        try:
-            frame = frame[key]
-        except (KeyError, IndexError, TypeError):
-            return None
-    return frame
-
-
 def _hull(points: Points) -> Points:
     """The corners of the convex hull of points that are sorted by x and then y, anticlockwise, by
     Andrew's monotone chain (Information Processing Letters 9, 1979, 216). scipy.spatial, which has

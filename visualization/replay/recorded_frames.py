@@ -16,14 +16,20 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.episodes import episodes
-from hapticlink.analysis.findings.tracking import find_users, of_any_shape, of_block, table_of
+from hapticlink.analysis.findings.tracking import (
+    find_users,
+    newest,
+    of_any_shape,
+    of_block,
+    table_of,
+)
 from hapticlink.analysis.findings.user_port import tolerated_in_run, user_port
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import JOINT_COORDINATES, POINT_POSE, by_user
-from hapticlink.orchestrator.results.read_results import Results, Table, Vector, load
+from hapticlink.orchestrator.results.read_results import Results, Vector, load
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization.mechanism.frame_signals import candidates
 from hapticlink.visualization.mechanism.picture import PORT, Picture
@@ -140,11 +146,6 @@ def _by_user(values: dict[str, Any]) -> dict[str, Any]:
         of = frame.setdefault("others", {}).setdefault(user, {}) if user else frame
         of[name] = value
     return frame
-
-
-def newest(table: Table, times: Vector) -> NDArray[np.intp]:
-    """The newest row at each of the times (s)."""
-    return np.maximum(np.searchsorted(table["time"], times + 1e-12, "right") - 1, 0)
 
 
 def _choose_signals(results: Results) -> tuple[dict[str, str], list[str]]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from hapticlink.orchestrator.scene.blocks import Blocks, driver_of, from_graphics
 from hapticlink.orchestrator.scene.checks.linkage import points
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, path_of_user
 
 
 def check_blocks(scene: Scene, blocks: Blocks) -> Iterator[Problem]:
@@ -73,7 +73,7 @@ def _boards(scene: Scene) -> Iterator[Problem]:
     for user, device in scene.all_devices.items():
         if not driver_of(scene, user):
             continue
-        table: Path = ("devices", user) if user else ("device",)
+        table = path_of_user("device", user)
         if scene.sensing != "encoders":
             yield ("sensing",), "a board has encoders: take sensing = 'encoders'"
         elif not device.observer.beside:
@@ -93,7 +93,7 @@ def _observers(scene: Scene) -> Iterator[Problem]:
     each key of a law that its observer does not have."""
     for user, device in scene.all_devices.items():
         spec = device.observer
-        table: Path = (*(("devices", user) if user else ("device",)), "observer")
+        table = (*path_of_user("device", user), "observer")
         if scene.sensing == "ideal" and spec.beside:
             message = (
                 "true, and with sensing = 'ideal' nothing is observed: take sensing = 'encoders', "

@@ -9,14 +9,14 @@ from hapticlink.components.specs.device import Device, Handle
 from hapticlink.orchestrator.scene.checks.linkage import check_linkage
 from hapticlink.orchestrator.scene.checks.space import check_joints_and_inertias
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, path_of_user
 
 _HANDLE: Path = ("linkage", "operational_point")
 
 
 def check_devices(scene: Scene) -> Iterator[Problem]:
     for user, device in scene.all_devices.items():
-        here: Path = ("devices", user) if user else ("device",)
+        here = path_of_user("device", user)
         alone = replace(scene, linkage=device.linkage, graphics=None)
         found = [*check_linkage(alone)]
         if device.linkage.spatial:

@@ -13,7 +13,7 @@ from hapticlink.components.specs.hand import ArmHand
 from hapticlink.components.specs.joint_types import JOINT_TYPES, CutType, TreeType
 from hapticlink.components.specs.linkage import Joint, Linkage, Loop
 from hapticlink.orchestrator.scene.scene import Scene
-from hapticlink.orchestrator.scene.toml_keys import Path, Problem
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, path_of_user
 
 PARALLEL = 1e-9
 """Sine of the angle between two axes below which they are one."""
@@ -29,7 +29,7 @@ def check_space(scene: Scene) -> Iterator[Problem]:
         return
     for user, device in scene.all_devices.items():
         if device.space != scene.linkage.space:
-            yield ("devices", user) if user else ("device",), _misfit(scene.linkage, device)
+            yield path_of_user("device", user), _misfit(scene.linkage, device)
     if scene.linkage.dimension > 2:
         yield from _of_the_plane(scene, scene.linkage)
         yield from check_joints_and_inertias(scene.linkage)
@@ -126,10 +126,9 @@ def _defaults(here: Path, given: object, default: ArmHand | Teleoperation) -> It
 def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
     """What a scene with a linkage in space cannot have."""
     for user, hand in scene.all_hands.items():
-        here: Path = ("hands", user) if user else ("hand",)
-        yield from _defaults(here, hand, _ARM)
+        yield from _defaults(path_of_user("hand", user), hand, _ARM)
     for user, controller in scene.all_controllers.items():
-        table: Path = ("controllers", user) if user in scene.controllers else ("controller",)
+        table = path_of_user("controller", user if user in scene.controllers else "")
         yield from _defaults((*table, "teleoperation"), controller.teleoperation, _COUPLING)
     if scene.contacts:
         text = "are of the plane: a linkage in space has none, take them out"

@@ -21,7 +21,7 @@ from hapticlink.components.port_space import PLANE
 from hapticlink.components.specs.control import Controller
 from hapticlink.components.specs.device import Handle, Observer
 from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.scene.device_files import list_devices
+from hapticlink.orchestrator.scene.find_scene import list_shipped
 from tests.blocks import Running
 from tests.devices import device
 from tests.mechanisms import MOBILITY as LAMBDA_INV
@@ -42,7 +42,7 @@ RANGED = {"joint.a_left.range": [0.5, 4.0]}
 
 
 def test_every_shipped_device_has_the_coordinates_that_suit_it():
-    assert KINDS.keys() == list_devices().keys()
+    assert KINDS.keys() == list_shipped("device").keys()
     for name, kind in KINDS.items():
         assert type(device_model(device(name))) is kind
 
@@ -273,7 +273,7 @@ def test_the_pantograph_is_isotropic_where_its_paper_says():
 
 
 def test_origins_of_numbers_are_told_by_their_words():
-    for name in list_devices():
+    for name in list_shipped("device"):
         assert all(vars(device(name).origin).values())
     with pytest.raises(InputFault, match="origin: masses = 'guessed' begins with none of printed"):
         device("2diy", {"origin.masses": "guessed"})
