@@ -30,13 +30,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7515,
-    "fmus": 2992,
-    "orchestrator": 16851,
+    "components": 7492,
+    "fmus": 2991,
+    "orchestrator": 16843,
     "programs": 1027,
-    "analysis": 9120,
-    "visualization": 3858,
-    "api": 645,
+    "analysis": 9111,
+    "visualization": 3848,
+    "api": 637,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
