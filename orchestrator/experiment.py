@@ -91,11 +91,12 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 try:
-                    return load(self.folder, from_rows=True, record=record)
+                    found = load(self.folder, from_rows=True, record=record)
                 except InputFault as why:  # which this run has written
                     raise self.outcome.fault or Fault(
                         f"the results are gone, or were changed while the run wrote them: {why}"
                     ) from None
+                return found.knowing(record, self.scene)
             return _ResultsInMemory(self, self.memory.tables(), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)
@@ -111,10 +112,9 @@ class _ResultsInMemory(Results):
 
     _experiment: Experiment
 
-    def __init__(
-        self, experiment: Experiment, tables: Mapping[str, Table], record: RunRecord
-    ) -> None:
-        vars(self).update(folder=None, tables=tables, record=record, _experiment=experiment)
+    def __init__(self, made: Experiment, tables: Mapping[str, Table], record: RunRecord) -> None:
+        vars(self).update(folder=None, tables=tables, _experiment=made)
+        self.knowing(record, made.scene)
 
     @cached_property
     def run(self) -> dict[str, Any]:

@@ -30,13 +30,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7515,
+    "components": 7522,
     "fmus": 2992,
-    "orchestrator": 16564,
+    "orchestrator": 16560,
     "programs": 1027,
     "analysis": 9122,
-    "visualization": 3858,
-    "api": 645,
+    "visualization": 3856,
+    "api": 647,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and

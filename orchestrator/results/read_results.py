@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -153,6 +153,13 @@ class Results:
     folder: Path | None
     run: dict[str, Any]
     tables: Mapping[str, Table]
+    known_scene: ClassVar[Any] = None
+    """The Scene, of which run.json has the tables, where this process has just run it."""
+
+    def knowing(self, record: RunRecord, scene: object = None) -> Self:
+        """These, with `record`, and perhaps `known_scene`, that need not be read from `run`."""
+        vars(self).update(record=record, known_scene=scene)
+        return self
 
     @property
     def last_time(self) -> float:
@@ -182,12 +189,6 @@ class Results:
     def graphics(self) -> Table:
         """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
-
-
-def with_record(results: Results, record: RunRecord) -> Results:
-    """Results whose `record` is known without reading it from `run`."""
-    vars(results)["record"] = record
-    return results
 
 
 class FolderTables(Mapping[str, Table]):
@@ -223,7 +224,7 @@ def load(folder: Path | str, from_rows: bool = False, record: RunRecord | None =
     run = run_json(folder)
     record = record or run_record.read_record(run, folder)
     tables = FolderTables(folder, record, from_rows)
-    return with_record(Results(folder, run, dict(tables)), record)
+    return Results(folder, run, dict(tables)).knowing(record)
 
 
 def read_into_memory(results: Results) -> Results:
@@ -232,7 +233,7 @@ def read_into_memory(results: Results) -> Results:
         name: replace(table, rows=table.rows.read()) if isinstance(table.rows, RowsFile) else table
         for name, table in results.tables.items()
     }
-    return with_record(replace(results, tables=tables), results.record)
+    return replace(results, tables=tables).knowing(results.record, results.known_scene)
 
 
 def without_rows(results: Results) -> Mapping[str, Table]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from typing import Annotated, Literal
 
-from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Discriminator, Field, ValidationError
 
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     MODEL,
     RANGES,
@@ -88,12 +88,7 @@ class TrialReply:
 
 
 Message = Hand | SetControl | Time | Compare | TrialReply
-
-
-@cache
-def _adapter() -> TypeAdapter[Message]:
-    """Made with the first message, which no page sends before it has shown a picture."""
-    return TypeAdapter(Annotated[Message, Discriminator("type")])
+_Sent = Annotated[Message, Discriminator("type")]
 
 
 def newest(received: Sequence[Message]) -> list[Message]:
@@ -114,7 +109,8 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
-        return _adapter().validate_json(text)
+        message: Message = adapter(_Sent).validate_json(text)
+        return message
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))
