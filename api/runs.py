@@ -200,7 +200,8 @@ def _describe_run(
 def _result(folder: Path | None, results: Results, found: Findings, run: dict[str, Any]) -> Run:
     """What is returned of results, of which `run` is what run.json says."""
     told = Run(folder, run | found.added, without_rows(results), numbers=found.numbers)
-    return told.knowing(replace(found.record, files=run["files"]), results.known_scene)
+    record = replace(found.record, files=run["files"], scene=run["scene"])
+    return told.knowing(record, results.known_scene)
 
 
 @contextmanager

@@ -91,12 +91,11 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 try:
-                    found = load(self.folder, from_rows=True, record=record)
+                    return load(self.folder, True, record).knowing(record, self.scene)
                 except InputFault as why:  # which this run has written
                     raise self.outcome.fault or Fault(
                         f"the results are gone, or were changed while the run wrote them: {why}"
                     ) from None
-                return found.knowing(record, self.scene)
             return _ResultsInMemory(self, self.memory.tables(), record)
         empty: dict[str, Table] = {}
         recorded = _columns(self.system)

@@ -32,11 +32,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7522,
     "fmus": 2992,
-    "orchestrator": 16560,
+    "orchestrator": 16557,
     "programs": 1027,
     "analysis": 9122,
-    "visualization": 3856,
-    "api": 647,
+    "visualization": 3855,
+    "api": 648,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and

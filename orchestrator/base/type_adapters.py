@@ -1,4 +1,4 @@
-"""Readers and writers of records by pydantic."""
+"""Readers and writers of types by pydantic."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-
-@cache
-def adapter(kind: Any) -> TypeAdapter[Any]:
-    """The reader of a type, made once: that of scenes takes ten times as long to make as a scene to
-    read."""
-    return TypeAdapter(kind)
+adapter = cache(TypeAdapter[Any])
+"""That of a type, made once: the reader of scenes takes ten times as long to make as a scene to
+read."""

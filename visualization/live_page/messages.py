@@ -87,8 +87,7 @@ class TrialReply:
     given: Name
 
 
-Message = Hand | SetControl | Time | Compare | TrialReply
-_Sent = Annotated[Message, Discriminator("type")]
+Message = Annotated[Hand | SetControl | Time | Compare | TrialReply, Discriminator("type")]
 
 
 def newest(received: Sequence[Message]) -> list[Message]:
@@ -109,7 +108,7 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
-        message: Message = adapter(_Sent).validate_json(text)
+        message: Message = adapter(Message).validate_json(text)
         return message
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
