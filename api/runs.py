@@ -26,6 +26,7 @@ from hapticlink.orchestrator.results import folder_lock, folders
 from hapticlink.orchestrator.results.read_results import (
     Results,
     read_into_memory,
+    with_record,
     without_rows,
 )
 from hapticlink.orchestrator.results.read_results import load as read_tables
@@ -201,7 +202,7 @@ def _result(folder: Path | None, results: Results, found: Findings, run: dict[st
     """What is returned of results, of which `run` is what run.json says."""
     told = Run(folder, run | found.added, without_rows(results), numbers=found.numbers)
     record = replace(found.record, files=run["files"], scene=run["scene"])
-    return told.knowing(record, results.known_scene)
+    return with_record(told, record, results.known_scene)
 
 
 @contextmanager

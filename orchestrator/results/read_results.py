@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from textwrap import fill
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -156,11 +156,6 @@ class Results:
     known_scene: ClassVar[Any] = None
     """The Scene, of which run.json has the tables, where this process has just run it."""
 
-    def knowing(self, record: RunRecord, scene: object = None) -> Self:
-        """These, with `record`, and perhaps `known_scene`, that need not be read from `run`."""
-        vars(self).update(record=record, known_scene=scene)
-        return self
-
     @property
     def last_time(self) -> float:
         """The time (s) of the last row of the first table that has any."""
@@ -189,6 +184,15 @@ class Results:
     def graphics(self) -> Table:
         """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
+
+
+R = TypeVar("R", bound=Results)
+
+
+def with_record(results: R, record: RunRecord, scene: object = None) -> R:
+    """Results whose `record`, and perhaps `known_scene`, are known without reading `run`."""
+    vars(results).update(record=record, known_scene=scene)
+    return results
 
 
 class FolderTables(Mapping[str, Table]):
@@ -223,8 +227,7 @@ def load(folder: Path | str, from_rows: bool = False, record: RunRecord | None =
     folder = Path(folder)
     run = run_json(folder)
     record = record or run_record.read_record(run, folder)
-    tables = FolderTables(folder, record, from_rows)
-    return Results(folder, run, dict(tables)).knowing(record)
+    return with_record(Results(folder, run, {**FolderTables(folder, record, from_rows)}), record)
 
 
 def read_into_memory(results: Results) -> Results:
@@ -233,7 +236,7 @@ def read_into_memory(results: Results) -> Results:
         name: replace(table, rows=table.rows.read()) if isinstance(table.rows, RowsFile) else table
         for name, table in results.tables.items()
     }
-    return replace(results, tables=tables).knowing(results.record, results.known_scene)
+    return with_record(replace(results, tables=tables), results.record, results.known_scene)
 
 
 def without_rows(results: Results) -> Mapping[str, Table]:

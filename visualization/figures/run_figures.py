@@ -6,7 +6,6 @@ Names: operational point x_S (of the mechanism), handle x_D (of the device).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import cycle, product
 from textwrap import fill
@@ -40,7 +39,7 @@ from hapticlink.orchestrator.base.signal_names import (
     signal_of_user,
 )
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector, with_record
 from hapticlink.orchestrator.results.recorded_scene import described_devices, scene_part
 from hapticlink.visualization import figure_axes
 from hapticlink.visualization.curve_colours import CURVES
@@ -89,7 +88,8 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
     if not results.last_time:
         return drawn_by
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
-    results = replace(results, tables=with_rows).knowing(results.record, results.known_scene)
+    whole_run = Results(results.folder, results.run, with_rows)
+    results = with_record(whole_run, results.record, results.known_scene)
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
 from pydantic import ConfigDict, Discriminator, Field, ValidationError
 
@@ -108,8 +108,7 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
-        message: Message = adapter(Message).validate_json(text)
-        return message
+        return cast(Message, adapter(Message).validate_json(text))
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))
