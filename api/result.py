@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from hapticlink.analysis.findings import summary
 from hapticlink.analysis.findings.measures import Measures
-from hapticlink.analysis.findings.tracking import Tracking, pose_error, table_of
+from hapticlink.analysis.findings.tracking import Tracking, pose_error
 from hapticlink.fmus.versions import install_command
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.results.read_results import Results, Table, Vector
@@ -95,7 +95,7 @@ class Run(Results):
         return run_figures.figures(self)
 
     def _table(self, name: str) -> Table:
-        found = table_of(self, name)
+        found = next((table for table in self.tables.values() if name in table), None)
         if found is None or name == "time":
             signals = [s for table in self.tables.values() for s in table.signals if s != "time"]
             raise KeyError(unknown("rate or signal", name, [*self.tables, *signals]))

@@ -32,7 +32,7 @@ PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
 
 def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[str]) -> RunSetup:
     """The record of a run that has not begun. tables: names of its tables, without their ending;
-    not_recorded: outputs of which an entry is not written."""
+    not_recorded: outputs of which an entry is not written in the rows of its rate."""
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
     end = timeline.time(timeline.end)
@@ -45,7 +45,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         plugins=plugins.list_plugins(),
         seeds=_seeds(scene, system),
         files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],
-        rates=[c.name for c in timeline.clocks],
+        rates=[n for c in timeline.clocks for n in system.recording.tables(c.name)],
         clocks={
             c.name: ClockSteps(seconds(c.first), seconds(c.shortest), seconds(c.longest))
             for c in timeline.clocks

@@ -201,27 +201,31 @@ def _prepare_again(scene: Scene, every: System) -> Prepared | None:
 
 
 def _columns(system: System) -> dict[str, list[str]]:
-    """The column names of each clock's table, if it has one."""
+    """The column names of each table that has some."""
     signals = SignalVector(system)
-    recorded = {clock.name: signals.recorded(clock.name) for clock in system.timeline.clocks}
-    return {clock: [*columns] for clock, columns in recorded.items() if columns is not None}
+    tables = (system.recording.tables(clock.name) for clock in system.timeline.clocks)
+    recorded = {name: signals.recorded(name) for names in tables for name in names}
+    return {table: [*columns] for table, columns in recorded.items() if columns is not None}
 
 
 def _find_left_out(every: System, system: System) -> list[str]:
-    """The outputs `fmu.port` of which an entry is not written."""
-    if system.recording.outputs is None:
+    """The outputs `fmu.port` of which an entry is not written in the rows of its rate."""
+    if (written := system.recording.outputs) is None:
         return []
+    rows = {*written}.difference(*(t.outputs for t in system.recording.slower.values()))
     outputs = ((u.name, s) for u in every.fmus for s in u.description.outputs)
-    left_out = (
-        f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in system.recording.outputs
-    )
+    left_out = (f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in rows)
     return [*dict.fromkeys(left_out)]
 
 
 def _fits_in_memory(system: System, columns: Mapping[str, Sequence[str]]) -> bool:
     """Whether the rows of a run may be kept in memory."""
-    counts = {c.name: len(c.starts) for c in system.timeline.clocks}
-    written = sum(counts[clock] * (1 + len(names)) for clock, names in columns.items())
+    counts = {
+        table: len(clock.starts)
+        for clock in system.timeline.clocks
+        for table in system.recording.tables(clock.name)
+    }
+    written = sum(counts[table] * (1 + len(names)) for table, names in columns.items())
     return 8 * written <= IN_MEMORY
 
 

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
 from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
-from hapticlink.orchestrator.results.state_file import SUFFIX, read_state
+from hapticlink.orchestrator.results.state_file import SUFFIX, expect_state, read_state
 from hapticlink.orchestrator.scene import overrides
 from hapticlink.orchestrator.scene.extends import document
 from hapticlink.orchestrator.scene.find_scene import find_scene
@@ -54,8 +54,9 @@ def source_of(scene: str | FilePath | Scene) -> Source:
 
 def _find(scene: str) -> Source:
     if scene.endswith(SUFFIX):
-        tables = read_state(FilePath(scene))["scene"]
-        return Source(tables["title"], tables | {"resume": scene}, {})
+        with expect_state(FilePath(scene)):
+            tables = read_state(FilePath(scene))["scene"]
+            return Source(str(tables["title"]), tables | {"resume": scene}, {})
     if scene.endswith((".ssp", ".xml")):
         # Imported here, since their XML parsers are slow to load.
         from hapticlink.orchestrator.ssp import osp, read

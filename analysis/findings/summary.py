@@ -429,7 +429,7 @@ def describe_unrecorded(left_out: Collection[str], fmus: Iterable[str] = ()) -> 
     parts = [f"{what} ({', '.join(signals)})" for what, signals in missing.items() if signals]
     if parts:
         yield (
-            f"not recorded, and so not reported or drawn in full: {'; '.join(parts)} "
+            f"not recorded in every row, and so not reported or drawn in full: {'; '.join(parts)} "
             "(record.signals)"
         )
 

@@ -126,11 +126,10 @@ def find_users(results: Results) -> list[UserSignals]:
 
 
 def table_of(results: Results, signal: str) -> Table | None:
-    """The table that contains `signal`, whose rate depends on the scene; None if there is none."""
-    for table in results.tables.values():
-        if signal in table:
-            return table
-    return None
+    """The table that contains `signal`, whose rate depends on the scene; None if there is none. Of
+    those with fewer rows than their rate has communication points by `record.signals`, none."""
+    clocks = results.record.clocks
+    return next((t for n, t in results.tables.items() if n in clocks and signal in t), None)
 
 
 def of_block(results: Results, signal: str, *shape: int) -> Table | None:

@@ -34,7 +34,7 @@ from hapticlink.orchestrator.fmi.variables import (
     numbers,
     require_countable,
     require_unique,
-    text,
+    texts,
 )
 
 if TYPE_CHECKING:  # a word of the contract, whose module loads casadi
@@ -341,7 +341,7 @@ def _variables(
         for s in numbers(v, version, v.name in relative, bounded=bounded, resized=resized)
     ]
     scalars = annotation.with_units(tree, numbered)
-    strings = tuple(text(v) for v in model.modelVariables if v.type in WRITTEN and not v.shape)
+    strings = tuple(s for v in model.modelVariables if v.type in WRITTEN for s in texts(v))
     require_unique(s.name for s in (*scalars, *strings))
     return {
         "scalars": scalars,

@@ -105,9 +105,12 @@ class WithEvents(InProcess):
         self._plan(self.time, {c.reference for c in self._clocks if c.kind == "changing"})
         self._fmi("ExitInitializationMode")
         self._initialized = True
-        if self._iterate():
+        ends = self._iterate()
+        if not ends:
+            self._fmi(self._back)
+            ends = self.pending.next_event <= self.time and self.event(self.time)
+        if ends:
             raise AsksToEnd(self.name, "has asked to end the simulation", self.time)
-        self._fmi(self._back)
         self.read()
         self._start_loop()
 

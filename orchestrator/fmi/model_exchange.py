@@ -27,7 +27,7 @@ from hapticlink.orchestrator.base.errors import FmuFault
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.fmi.cvode import Cvode, Unsolved
 from hapticlink.orchestrator.fmi.description import TOLERANCE
-from hapticlink.orchestrator.fmi.event_mode import WithEvents, is_continuous
+from hapticlink.orchestrator.fmi.event_mode import MOST, WithEvents, is_continuous
 from hapticlink.orchestrator.fmi.fmi3_differences import InProcess3
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.status import DISCARD, SHARE, succeeded
@@ -229,17 +229,32 @@ class ModelExchange(WithEvents):
         active: Collection[int] = (),
         settings: Callable[[], object] = lambda: None,
     ) -> bool:
-        """A time event that rounding has put behind this instant is one of it: an FMU that compares
-        its time with that of the event finds it reached."""
-        next_event = self.pending.next_event
-        if time < next_event <= time + SHARE * self.place.size:
-            self._of_fmu = next_event
-            self._fmi("SetTime", next_event)
-        self._begins = True
-        self._counts["events"] += 1
-        if self.description.states is not None and self._counted:
-            raise self._fault("has an event where it is linearised, behind which nothing is", time)
-        return super().event(time, active, settings)
+        """A time event that rounding has put behind this instant, and one that lies before it, is
+        one of it: an FMU that compares its time with that of the event finds it reached. So there
+        are as many as an FMU that starts later than at 0 has behind it."""
+        near, told = SHARE * self.place.size, time
+        for _ in range(MOST):
+            if (due := self.pending.next_event) <= time + near and due != told:
+                told = self._set_time(due)
+            self._begins = True
+            self._counts["events"] += 1
+            if self.description.states is not None and self._counted:
+                raise self._fault(
+                    "has an event where it is linearised, behind which nothing is", time
+                )
+            if super().event(time, active, settings):
+                return True
+            active, settings = (), lambda: None
+            if self.pending.next_event > time:
+                if told < time:
+                    self._set_time(time)
+                return False
+        raise self._fault(f"its next event stays in the past after {MOST} of them", time)
+
+    def _set_time(self, time: float) -> float:
+        self._fmi("SetTime", time)
+        self._of_fmu = time
+        return time
 
     def rollback(self, slot: int = 0) -> None:
         super().rollback(slot)

@@ -1,7 +1,7 @@
 """Copies values between a vector and an FMU, with one C call per FMI type.
 
-A String or Binary is in a signal vector as its number among those that this process has met: so it
-is held, delayed and passed on as a number is, and what an FMU gets are the bytes.
+A String or Binary is in a signal vector as its number, a hash of its bytes: so it is held, delayed,
+saved and passed on as a number is, the same in each run, and what an FMU gets are the bytes.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
+from hashlib import sha256
 from itertools import groupby
 from types import MappingProxyType
 from typing import Any
@@ -29,9 +30,12 @@ _IN_C: dict[str, type[np.generic]] = {
 }  # fmt: skip
 _BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
 
-_TEXTS = [b""]
+_TEXTS = {0: b""}
 _NUMBERS = {b"": 0}
 _LOCK = threading.Lock()
+NUMBER = 6
+"""Bytes of the number of a text, which a double holds exactly."""
+_followers: list[Callable[[int, bytes], object]] = []
 
 
 class Unfit(Exception):
@@ -126,16 +130,46 @@ def as_signal(scalar: Scalar, value: Given) -> float:
     """A start value as a signal has it."""
     if isinstance(value, str):
         text = bytes.fromhex(value) if scalar.type == "Binary" else value.encode()
-        return float(_number_of(text))
+        return float(number_of(text))
     return float(value)
 
 
-def _number_of(text: bytes) -> int:
+def number_of(text: bytes) -> int:
+    """The number of a text, by which it is known from now on."""
     with _LOCK:
         if text not in _NUMBERS:
-            _NUMBERS[text] = len(_TEXTS)
-            _TEXTS.append(text)
+            number = int.from_bytes(sha256(text).digest()[:NUMBER])
+            while _TEXTS.setdefault(number, text) != text:  # two in some 10^7 texts
+                number += 1
+            _NUMBERS[text] = number
+            for follower in _followers:
+                follower(number, text)
         return _NUMBERS[text]
+
+
+def known_texts() -> dict[int, bytes]:
+    """All texts of this process by their numbers."""
+    with _LOCK:
+        return dict(_TEXTS)
+
+
+def follow_texts(follower: Callable[[int, bytes], object]) -> None:
+    """Tells `follower` all texts of this process, those to come when it meets them first."""
+    with _LOCK:
+        for known in _TEXTS.items():
+            follower(*known)
+        _followers.append(follower)
+
+
+def leave_texts(follower: Callable[[int, bytes], object]) -> None:
+    """Tells it no more, if it was told."""
+    with _LOCK:
+        _followers[:] = [each for each in _followers if each != follower]
+
+
+def shown(text: bytes, type_: str) -> str:
+    """A text of an FMI type as tables have it: a Binary in hexadecimal digits."""
+    return text.hex() if type_ == "Binary" else text.decode(errors="backslashreplace")
 
 
 class TextTransfer:
@@ -146,13 +180,14 @@ class TextTransfer:
     def __init__(
         self, slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], values: Vector
     ) -> None:
-        n, type_ = ctypes.c_size_t(len(scalars)), scalars[0].type
+        of, type_ = [s.reference for s in scalars if s.entry == 0], scalars[0].type
+        n, size = ctypes.c_size_t(len(of)), len(scalars)
         self.name, self._values, self._gets = f"fmi{fmi}{verb}{type_}", values, verb == "Get"
         self._function, self._is_binary = slave.dll[self.name], type_ == "Binary"
-        self._texts = (ctypes.c_char_p * n.value)()
-        self._sizes = (ctypes.c_size_t * n.value)()
-        references = (ctypes.c_uint * n.value)(*(s.reference for s in scalars))
-        binary, three = [self._sizes] * self._is_binary, [n] * (fmi == "3")
+        self._texts = (ctypes.c_char_p * size)()
+        self._sizes = (ctypes.c_size_t * size)()
+        references = (ctypes.c_uint * n.value)(*of)
+        binary, three = [self._sizes] * self._is_binary, [ctypes.c_size_t(size)] * (fmi == "3")
         own = ctypes.c_void_p(slave.component)
         self._arguments = [own, references, n, *binary, self._texts, *three]
 
@@ -166,7 +201,7 @@ class TextTransfer:
             starts = ctypes.cast(self._texts, ctypes.POINTER(ctypes.c_void_p))
             for i, size in enumerate(self._sizes):
                 text = ctypes.string_at(starts[i], size) if size else self._texts[i] or b""
-                self._values[i] = _number_of(b"" if self._is_binary and not size else text)
+                self._values[i] = number_of(b"" if self._is_binary and not size else text)
         return status
 
 

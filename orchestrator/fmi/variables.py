@@ -208,10 +208,12 @@ def require_unique(names: Iterable[str]) -> None:
         raise ValueError(f"variable {name!r}: {count} variables have this name")
 
 
-def text(v: Any) -> Scalar:
+def texts(v: Any) -> Iterator[Scalar]:
+    """The entries of a String or Binary."""
     check_variable(v)
-    about = v.causality or "local", None, v.variability
-    return Scalar(v.name, v.valueReference, v.type, *about, initial=v.initial)
+    about = v.causality or "local", None, v.variability, math.nan if v.shape else 0.0
+    for i, name in enumerate(names_of(v)):
+        yield Scalar(name, v.valueReference, v.type, *about, entry=i, initial=v.initial)
 
 
 def _number(text: str) -> float:

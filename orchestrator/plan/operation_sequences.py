@@ -108,7 +108,7 @@ def step(system: System, event: Event, fmu: Fmu) -> Iterator[Operation]:
 def record(system: System, event: Event) -> Iterator[Operation]:
     """Record a row for each clock that fires, then test the stop condition."""
     for f in event.firings:
-        yield Record(f.clock)
+        yield from map(Record, system.recording.tables(f.clock))
     condition = system.ends_when
     if condition and any(f.clock == system.fmu[condition.fmu].clock for f in event.firings):
         yield StopWhen()

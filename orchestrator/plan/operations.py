@@ -210,9 +210,9 @@ class Step(OfFmu):
 
 @dataclass(frozen=True)
 class Record(Instruction):
-    """Write a row of a clock's table: the outputs of all its FMUs."""
+    """Write a row of a table, of a clock's: outputs of all its FMUs."""
 
-    clock: str
+    table: str
     does = "write a row of a rate's table"
     code = "RECORD"
     observes = True

@@ -70,7 +70,7 @@ class Plan:
         event = next(iter(self)).event
         operations = tuple(self.unrolled(event))
         stepped = {op.fmu for op in operations if isinstance(op, Step)}
-        recorded = {op.clock for op in operations if isinstance(op, Record)}
+        recorded = {op.table for op in operations if isinstance(op, Record)}
         going = {f.clock for f in event.firings if not f.final}
         left = [u.name for u in self.system.fmus if u.clock in going and u.name not in stepped]
         left += [f"the rows of {f.clock}" for f in event.firings if f.clock not in recorded]

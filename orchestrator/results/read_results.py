@@ -39,13 +39,15 @@ class Table(Mapping[str, Vector]):
     """The samples of one rate by name: `table["device.x"]` stacks the columns `device.x[1]`,
     `device.x[2]`, ... into (rows, n), those of a matrix into (rows, n, m), by their indices,
     whichever column comes first; entries with gaps between them into (rows, k). The full name of a
-    column gives that column, (rows,). Raises KeyError for an unknown name. `others` are the tables
+    column gives that column, (rows,). A String or Binary is an array of str, of which `rows` have
+    the numbers of `texts`. Raises KeyError for an unknown name. `others` are the tables
     of the same run, for that message. `rows` of a long run are in their file.
     """
 
     columns: tuple[str, ...]
     rows: Vector | RowsFile
     others: Mapping[str, Table] = field(default_factory=dict)
+    texts: rows_file.Texts = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Vector:
         if (place := self._places.get(name)) is not None:
@@ -63,6 +65,15 @@ class Table(Mapping[str, Vector]):
 
     def _read(self, places: int | Sequence[int]) -> Vector:
         """Columns; of a file copies, which take less memory than the rows that are mapped."""
+        found = self._read_numbers(places)
+        if not (self.texts and self.texts.keys() & {*np.ravel(places)}):
+            return found
+        each = zip(np.ravel(places), found.T.reshape(-1, len(self.rows)), strict=True)
+        words = [np.array([self.texts[int(at)][int(n)] for n in row], np.str_) for at, row in each]
+        read: Any = np.stack(words, axis=-1).reshape(found.shape)
+        return read  # a vector of numbers, but for texts
+
+    def _read_numbers(self, places: int | Sequence[int]) -> Vector:
         if not isinstance(self.rows, RowsFile):
             return self.rows[:, places]
         found = np.empty((*np.shape(places), len(self.rows))).T
@@ -81,7 +92,7 @@ class Table(Mapping[str, Vector]):
 
     def part(self, span: slice) -> Table:
         """The table of some rows."""
-        part = Table(self.columns, self.rows[span])
+        part = Table(self.columns, self.rows[span], texts=self.texts)
         vars(part).update(_places=self._places, _arrays=self._arrays)
         return part
 
@@ -165,8 +176,7 @@ class Results:
         """Whether both recorded the same signals with the same numbers."""
         pairs = ((self.tables[n], other.tables[n]) for n in self.tables if n in other.tables)
         return [*self.tables] == [*other.tables] and all(
-            mine.columns == its.columns and np.array_equal(mine.rows, its.rows, equal_nan=True)
-            for mine, its in pairs
+            mine.columns == its.columns and _are_equal(mine, its) for mine, its in pairs
         )
 
     @cached_property
@@ -184,6 +194,14 @@ class Results:
     def graphics(self) -> Table:
         """The Table of the graphics rate; KeyError where no FMU runs at it."""
         return self.tables["graphics"]
+
+
+def _are_equal(mine: Table, its: Table) -> bool:
+    """Whether tables of the same columns have the same rows."""
+    if not (mine.texts or its.texts):
+        return np.array_equal(mine.rows, its.rows, equal_nan=True)
+    pairs = ((mine[column], its[column]) for column in mine.columns)
+    return all(np.array_equal(a, b, equal_nan=a.dtype == float) for a, b in pairs)
 
 
 R = TypeVar("R", bound=Results)
@@ -265,14 +283,16 @@ def read_table(
     others = {} if others is None else others
     rows = path.with_suffix(rows_file.SUFFIX)
     if not rows.exists() or (path.exists() and not from_rows):
-        return Table(*_read_csv(path), others)
+        columns, values, texts = _read_csv(path)
+        return Table(columns, values, others, texts)
     _require_file(rows)
     written = RowsFile(rows)
-    return Table(written.columns, written if written.size > IN_MEMORY else written.read(), others)
+    read = written if written.size > IN_MEMORY else written.read()
+    return Table(written.columns, read, others, written.texts)
 
 
-def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
-    """The columns of a CSV of a run, and its rows."""
+def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
+    """The columns of a CSV of a run, and its rows, with the texts of their numbers."""
     _require_file(path)
     try:
         with path.open(encoding="utf-8", newline="") as file:
@@ -281,9 +301,13 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
                 why = f"its first column is {columns[0] if columns else ''!r}, not 'time'"
                 raise InputFault(f"{path}: line 1: {why}: run the scene again")
             if not (first := file.readline()):
-                return columns, np.zeros((0, len(columns)))
+                return columns, np.zeros((0, len(columns))), {}
             # The text of all lines would take twice what they take.
-            values = np.loadtxt(chain([first], file), delimiter=",", ndmin=2)
+            lines, texts = chain([first], file), dict[int, dict[int, str]]()
+            if '"' in first:
+                values, texts = _read_texts(lines)
+            else:
+                values = np.loadtxt(lines, delimiter=",", ndmin=2)
         if values.shape[1] != len(columns):
             raise ValueError
     except OSError as error:
@@ -298,7 +322,22 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector]:
         late = int(ordered.argmin())
         why = f"time = {values[late, 0]:g} s is before that of the line above"
         raise InputFault(f"{path}: line {late + 2}: {why}: run the scene again")
-    return columns, values
+    return columns, values, texts
+
+
+def _read_texts(lines: Iterator[str]) -> tuple[Vector, dict[int, dict[int, str]]]:
+    """The numbers of rows in which texts are in quotes, each text counted as it comes."""
+    numbers: dict[int, dict[str, int]] = {}
+    rows = []
+    for cells in csv.reader(lines, quoting=csv.QUOTE_NONNUMERIC, strict=True):
+        row: list[Any] = cells
+        for place, cell in enumerate(cells):
+            if isinstance(cell, str):
+                known = numbers.setdefault(place, {})
+                row[place] = known.setdefault(cell, len(known))
+        rows.append(row)
+    texts = {place: {n: word for word, n in known.items()} for place, known in numbers.items()}
+    return np.array(rows, np.float64), texts
 
 
 def _require_file(path: Path) -> None:

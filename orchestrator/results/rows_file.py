@@ -2,6 +2,8 @@
 rows, 8 bytes at the next multiple of 8; then the rows, doubles of this machine.
 
 A run writes its rows through a map of the file: whatever ends its process, the file has them all.
+Texts are in it as numbers, and beside it in `<rate>.texts`: a line with the FMI types of those
+columns, by their places, then a line for each number with the bytes of its text.
 """
 
 from __future__ import annotations
@@ -9,12 +11,14 @@ from __future__ import annotations
 import csv
 import ctypes
 import errno
+import json
 import mmap
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import FileIO
 from pathlib import Path
+from types import MappingProxyType
 from typing import BinaryIO
 
 import numpy as np
@@ -22,8 +26,9 @@ from numpy.typing import NDArray
 from pydantic_core import SchemaSerializer, core_schema
 
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.fmi.transfer import shown
 
-SUFFIX = ".rows"
+SUFFIX, TEXTS = ".rows", ".texts"
 AT_A_TIME = 1 << 16
 """Bytes of rows that are made text at a time."""
 RESERVED = 1 << 18
@@ -45,7 +50,7 @@ class RowsFile:
     """
 
     def __init__(self, path: Path) -> None:
-        self._path = path
+        self._path, self.texts = path, read_texts(path.with_suffix(TEXTS))
         with path.open("rb") as file:
             line = file.readline(MAX_HEADER)
             self.columns = _columns(line, path)
@@ -186,10 +191,47 @@ def _identify(file: FileIO) -> tuple[int, int]:
     return status.st_dev, status.st_ino
 
 
-def text(rows: Rows) -> bytes:
-    """Rows as CSV, each number as the shortest text that reads back to the same float."""
+Texts = Mapping[int, Mapping[int, str]]
+"""By the place of a column that is a text, the texts of its numbers."""
+
+
+def text(rows: Rows, texts: Texts = MappingProxyType({})) -> bytes:
+    """Rows as CSV, each number as the shortest text that reads back to the same float, each text in
+    quotes."""
     # pydantic's JSON, [1.0,2.0], writes floats ten times faster than repr, and round-trips too.
-    return b"".join([b"%b\n" % _as_json(row.tolist())[1:-1] for row in rows])
+    lines = (_as_json(row.tolist())[1:-1] for row in rows)
+    if texts:
+        lines = (_with_texts(line, row, texts) for line, row in zip(lines, rows, strict=True))
+    return b"".join([b"%b\n" % line for line in lines])
+
+
+def _with_texts(line: bytes, row: Rows, texts: Texts) -> bytes:
+    cells = line.split(b",")
+    for place, words in texts.items():
+        cells[place] = b'"%b"' % words[int(row[place])].replace('"', '""').encode()
+    return b",".join(cells)
+
+
+def text_line(number: int, text: bytes) -> str:
+    """The line of `<rate>.texts` that has a text."""
+    return f"{number} {text.hex()}\n"
+
+
+def read_texts(path: Path) -> Texts:
+    """Of a file of texts; none where there is no such file. Its last line may be cut."""
+    if not path.exists():
+        return {}
+    types, *lines = path.read_text().splitlines(keepends=True)
+    cells = (line.split(" ") for line in lines if line.endswith("\n"))
+    known = {int(number): bytes.fromhex(text) for number, text in cells}
+    return name_texts({int(i): type_ for i, type_ in json.loads(types).items()}, known)
+
+
+def name_texts(types: Mapping[int, str], known: Mapping[int, bytes]) -> Texts:
+    """By the places of columns of these FMI types, the texts that are known, as tables have
+    them."""
+    of = {type_: {n: shown(text, type_) for n, text in known.items()} for type_ in types.values()}
+    return {place: of[type_] for place, type_ in types.items()}
 
 
 def header(columns: tuple[str, ...]) -> bytes:
@@ -202,7 +244,7 @@ def write_csv(table: RowsFile, target: BinaryIO) -> None:
     target.write(header(table.columns))
     step = max(AT_A_TIME // (8 * len(table.columns)), 1)
     for first in range(0, len(table), step):
-        target.write(text(table[first : first + step]))
+        target.write(text(table[first : first + step], table.texts))
 
 
 def write_empty(path: Path, columns: tuple[str, ...], as_csv: bool) -> None:

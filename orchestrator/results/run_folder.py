@@ -171,7 +171,12 @@ def _list_files(folder: Path) -> set[str]:
         files = {n for n in texts if n != ".." and Path(n).name == n}
     except (InputFault, AttributeError, TypeError):
         return set()
-    rows = {Path(n).with_suffix(rows_file.SUFFIX).name for n in files if n.endswith(".csv")}
+    rows = {
+        Path(name).with_suffix(suffix).name
+        for name in files
+        for suffix in (rows_file.SUFFIX, rows_file.TEXTS)
+        if name.endswith((".csv", rows_file.SUFFIX))
+    }
     files = {n for n in files if not (folder / n).is_dir() or (folder / n).is_symlink()}
     files |= {LOG} if (folder / LOG).is_file() else set()
     return files | {name for name in rows if (folder / name).exists()}

@@ -67,7 +67,7 @@ class RunSetup:
     seeds: dict[str, int]
     files: list[str]
     rates: list[str]
-    """The names of the clocks."""
+    """The names of the clocks, each with those of its tables of fewer rows."""
     clocks: dict[str, ClockSteps]
     stop_when: str
     base: str
@@ -90,7 +90,7 @@ class RunSetup:
     get_after_set: list[str]
     power_across_rates: list[str]
     not_recorded: list[str]
-    """The outputs `fmu.port` of which an entry is not written."""
+    """The outputs `fmu.port` of which an entry is not written in the rows of its rate."""
     events: list[tuple[float, str]] = field(default_factory=list)
     """Times (s) and texts of what `[[at]]` does, each with the first step that it acts on."""
     units: dict[str, str] = field(default_factory=dict)

@@ -5,11 +5,14 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
+from hapticlink.orchestrator.fmi.transfer import known_texts
 from hapticlink.orchestrator.results.read_results import Table
+from hapticlink.orchestrator.results.rows_file import name_texts
 
 
 class Recorder:
@@ -27,6 +30,8 @@ class Recorder:
 
     files: tuple[str, ...] = ()
     """The names of those to which rows are written."""
+    texts: Mapping[int, str] = MappingProxyType({})
+    """The FMI types of those columns that are texts, by their places in a row."""
 
     def __init__(
         self,
@@ -169,7 +174,9 @@ class RunResults:
         """The tables by clock."""
         return {
             clock: Table(
-                r.columns, np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value]
+                r.columns,
+                np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value],
+                texts=name_texts(r.texts, known_texts()),
             )
             for clock, r in self._recorders.items()
         }

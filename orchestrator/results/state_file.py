@@ -7,14 +7,15 @@ import base64
 import hashlib
 import json
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hapticlink.orchestrator.base import text_files
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.results.write_files import write_atomically
 
 SUFFIX = ".state"
@@ -41,8 +42,30 @@ def read_state(path: Path) -> dict[str, Any]:
     checksum, _, body = rest.partition("\n")
     if _checksum(body) != checksum:
         raise InputFault(f"{path}: damaged, its checksum is another: save the state again")
-    content: dict[str, Any] = _decoded(json.loads(body))
+    with expect_state(path):
+        content: dict[str, Any] = {**_decoded(json.loads(body))}
     return content
+
+
+@contextmanager
+def expect_state(path: Path) -> Iterator[None]:
+    """Content of a state with which its reader can do nothing raises InputFault: whoever changed it
+    has made its checksum anew."""
+    try:
+        yield
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        ArithmeticError,
+        RecursionError,
+        AssertionError,
+    ) as error:
+        raise InputFault(
+            f"{path}: changed since it was saved, as its checksum was ({type(error).__name__}: "
+            f"{shorten(str(error))}): save the state again"
+        ) from error
 
 
 def _checksum(body: str) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import Fault
+from hapticlink.orchestrator.fmi import transfer
 from hapticlink.orchestrator.results import rows_file
 from hapticlink.orchestrator.results.run_results import Recorder
 
@@ -72,10 +73,24 @@ class FileRecorder(Recorder):
 
     def publish(self) -> None:
         if self._file:
+            self._publish_texts()
             if self._unfinished != self.target:
                 os.replace(self._unfinished, self.target)
                 self._file.path = self.target
             self._published = True
+
+    def _publish_texts(self) -> None:
+        """Write the texts of this process beside the rows, each further one before it is in a
+        row."""
+        path = self.path.with_suffix(rows_file.TEXTS)
+        path.unlink(missing_ok=True)
+        if self.texts:
+            path.write_text(json.dumps(self.texts) + "\n")
+            transfer.follow_texts(self._add_text)
+
+    def _add_text(self, number: int, text: bytes) -> None:
+        with self.path.with_suffix(rows_file.TEXTS).open("a") as file:
+            file.write(rows_file.text_line(number, text))
 
     def finish(self) -> None:
         if self._published and not self.is_awaited:
@@ -101,6 +116,7 @@ class FileRecorder(Recorder):
                 self._unfinished.unlink(missing_ok=True)
 
     def __exit__(self, *_: object) -> None:
+        transfer.leave_texts(self._add_text)
         if self._file:
             self.rows, self.filled = None, ctypes.c_int64()
             self._file.close()
@@ -116,7 +132,8 @@ def make_csv(path: Path, table: rows_file.RowsFile) -> None:
 def remove_rows(path: Path) -> None:
     """Remove the rows of which the CSV `path` was made."""
     with suppress(PermissionError):  # of Windows, where somebody still has them mapped
-        path.with_suffix(rows_file.SUFFIX).unlink(missing_ok=True)
+        for suffix in (rows_file.SUFFIX, rows_file.TEXTS):
+            path.with_suffix(suffix).unlink(missing_ok=True)
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:

@@ -27,7 +27,8 @@ def choose_fetched(system: System) -> System:
     every = tuple(f"{u.name}.{s.name}" for u in system.fmus for s in u.description.outputs)
     written = every if recording.outputs is None else recording.outputs
     often, rows = {*_find_read(system)}, {*written}
-    fmus = tuple(_with(u, often, rows, recording.every > 1) for u in system.fmus)
+    separate = recording.every > 1 and not recording.slower
+    fmus = tuple(_with(u, often, rows, separate) for u in system.fmus)
     return replace(system, fmus=fmus, recording=replace(recording, outputs=written))
 
 

@@ -23,7 +23,7 @@ from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     """The FMUs that run in a process of their own, here or elsewhere, by name, with the reason.
-    Raises InputFault for one of which a text is connected."""
+    Raises InputFault for one of which a text is connected or recorded."""
     fmus = tuple(fmus)
     asked = {u.name: "asked for" for u in fmus if u.isolate}
     asked |= {u.name: f"served from {u.served.address}" for u in fmus if u.served}
@@ -37,9 +37,10 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
     alone = asked | tools | clashes(u for u in fmus if u.name not in tools)
     for u in (u for u in fmus if u.name in alone):
         if text := next((s.name for s in u.description.scalars if s.type in WRITTEN), None):
-            what = f"{u.name}.{text} is a text, which is passed on within one process"
+            what = f"{u.name}.{text} is a text, which is read and set within one process"
             why = f"{u.name} runs in another ({alone[u.name]})"
-            raise InputFault(f"{what}; {why}: pass it on as an array of UInt8")
+            remedy = "leave it out of [[connection]] and record.signals, or take an array of UInt8"
+            raise InputFault(f"{what}; {why}: {remedy}")
     return alone
 
 

@@ -57,8 +57,8 @@ class OperationsInPython:
                 simulation.setters[fmu, now](values)
             case Step(fmu):
                 self._step(instruction, tick)
-            case Record(clock):
-                simulation.recorders[clock].row(simulation.time(tick))
+            case Record(table):
+                simulation.recorders[table].row(simulation.time(tick))
             case Save(fmu):
                 instances[fmu].save()
             case Rollback(fmu):

@@ -21,9 +21,10 @@ import numpy as np
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import SERIALISED
 from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
+from hapticlink.orchestrator.fmi.transfer import as_signal, known_texts, number_of
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
-from hapticlink.orchestrator.results.state_file import read_state, write_state
+from hapticlink.orchestrator.results.state_file import expect_state, read_state, write_state
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled.hold_structures import CompiledHold, array
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
@@ -51,10 +52,12 @@ class RunState:
 def read(path: Path) -> RunState:
     """Raises InputFault where a file is no state, or was made by another version."""
     content = read_state(path)
-    if content["layout"] != _layout():
+    with expect_state(path):
+        layout, version, _ = content["layout"], content["version"], float(content["time"])
+    if layout != _layout():
         raise InputFault(
-            f"{path}: made by another version of hapticlink ({content['version']}), whose states "
-            "have other contents: save it again with this one"
+            f"{path}: made by another version of hapticlink ({version}), whose states have other "
+            "contents: save it again with this one"
         )
     return RunState(path.absolute(), content)
 
@@ -94,8 +97,7 @@ def _why_unsavable(fmu: Fmu, is_isolated: bool) -> str:
         return "cannot save its state (canGetAndSetFMUstate)"
     if not any(flag.lower() == SERIALISED.lower() for flag in about.flags):
         return "cannot write its state to a file (canSerializeFMUstate)"
-    texts = [s.name for s in about.scalars if s.type in WRITTEN]
-    return f"{texts[0]} is a text, which is no part of the signals' numbers" if texts else ""
+    return ""
 
 
 def state_blocks(simulation: Simulation, with_own: bool = False) -> dict[str, StateBlock]:
@@ -148,8 +150,13 @@ def _capture(simulation: Simulation, loop: CompiledLoop) -> dict[str, Any]:
         "iterations": loop.operations.saved(),
         "balance": simulation.balance.begun,
         "changes": [_capture_change(*each) for each in simulation.changing],
+        "texts": [*known_texts().values()] if _has_texts(system) else [],
         "rows": {name: r.count.value for name, r in simulation.recorders.items()},
     }
+
+
+def _has_texts(system: System) -> bool:
+    return any(s.type in WRITTEN for u in system.fmus for s in u.description.scalars)
 
 
 def order_of_calls(system: System) -> dict[str, str]:
@@ -270,8 +277,15 @@ def require_plain_holds(simulation: Simulation) -> None:
 
 def restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> None:
     """Puts a run that was started, and whose system fits, into the state."""
+    with expect_state(state.path):
+        _restore(state, simulation, loop)
+
+
+def _restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> None:
     saved, system, signals = state.content, simulation.system, simulation.signals
     newer = {c.name for c in with_other_holds(state, system)}
+    for text in saved["texts"]:
+        number_of(text)
     for u in system.fmus:
         _restore_fmu(u, simulation, saved["fmus"][u.name])
     blocks = state_blocks(simulation)
@@ -350,7 +364,12 @@ def new_starts(state: RunState, system: System) -> Iterator[InputChange]:
             if value != before.get(name, by_name[name].start):
                 text = f"{u.name}.{name}"
                 yield InputChange(
-                    state.time, state.time, text, u.name, (by_name[name],), (float(value),)
+                    state.time,
+                    state.time,
+                    text,
+                    u.name,
+                    (by_name[name],),
+                    (as_signal(by_name[name], value),),
                 )
 
 

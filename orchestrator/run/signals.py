@@ -3,8 +3,11 @@ that the far sides of springs have put in."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
+from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.system.system import Connection, Fmu, System
 
 
@@ -66,10 +69,22 @@ class SignalVector:
             return list(range(held.start, held.stop))
         return self.sources(connection)
 
-    def recorded(self, clock: str) -> dict[str, int] | None:
-        """The columns `fmu.variable` of a clock's table with their indices, None where it has no
-        table."""
-        span, written = self.clock(clock), self.system.recording.outputs
+    def texts(self, recorded: Mapping[str, int] | None) -> dict[int, str]:
+        """By the places in a row of those recorded columns that are texts, their FMI types."""
+        types = {
+            f"{u.name}.{s.name}": s.type for u in self.system.fmus for s in u.description.outputs
+        }
+        columns = enumerate(recorded or (), 1)
+        return {place: types[name] for place, name in columns if types[name] in WRITTEN}
+
+    def recorded(self, table: str) -> dict[str, int] | None:
+        """The columns `fmu.variable` of a table with their indices, None where there are none."""
+        slower = self.system.recording.slower
+        of, written = slower.get(table), self.system.recording.outputs
+        span = self.clock(of.clock if of else table)
+        if written and slower:
+            apart = of.outputs if of else frozenset().union(*(t.outputs for t in slower.values()))
+            written = tuple(n for n in written if (n in apart) == (of is not None))
         names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
         columns = {n: i for n, i in names.items() if span.start <= i < span.stop}
         if written is None:

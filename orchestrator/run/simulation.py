@@ -156,14 +156,14 @@ class Simulation(LoadedFmus):
         time = self.system.timeline
         most = time.points(time.clocks[0]) if self.pace else 0
         for clock in time.clocks:
-            recorded, every = self.signals.recorded(clock.name), self.system.recording.every
             end = time.points(clock) - 1
-            values = self.signals.values
             before = self.rows_before.get(clock.name, 0)
-            recorder = self._results.recorder(
-                clock.name, recorded, values, every, end, most, before
-            )
-            self.recorders[clock.name] = self._stack.enter_context(recorder)
+            for name, every in self.system.recording.tables(clock.name).items():
+                recorded, values = self.signals.recorded(name), self.signals.values
+                recorder = self._results.recorder(name, recorded, values, every, end, most, before)
+                recorder.texts = self.signals.texts(recorded)
+                self.recorders[name] = self._stack.enter_context(recorder)
+            recorder = self.recorders[clock.name]
             for fmu in self.system.fmus:
                 if fmu.clock == clock.name:
                     self.instances[fmu.name].row_due = recorder.due

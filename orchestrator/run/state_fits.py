@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.results.state_file import expect_state
 from hapticlink.orchestrator.run.run_state import (
     RunState,
     new_starts,
@@ -22,9 +23,12 @@ SHOWN = 8
 
 def require_fit(state: RunState, system: System, tables: Mapping[str, Any]) -> None:
     """Raises InputFault with all that keeps a scene, of these tables, from going on."""
-    if found := [*why_no_fit(state, system)]:
+    with expect_state(state.path):
+        found = [*why_no_fit(state, system)]
+        other = [*_differences(state.content["scene"], tables)]
+    if found:
         lines = [f"{state.path}: the scene cannot go on from this state", *found]
-        if other := [*_differences(state.content["scene"], tables)]:
+        if other:
             more = f" and {len(other) - SHOWN} more" if len(other) > SHOWN else ""
             lines.append(f"settings that differ: {', '.join(other[:SHOWN])}{more}")
         raise InputFault("\n  ".join(lines))

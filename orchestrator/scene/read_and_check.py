@@ -41,6 +41,7 @@ from hapticlink.orchestrator.scene.scene import Scene, WrittenScene
 from hapticlink.orchestrator.scene.scene_source import Source
 from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
 from hapticlink.orchestrator.scene.toml_keys import (
+    Path,
     Problem,
     collect_problem,
     flat,
@@ -104,7 +105,7 @@ def from_source(source: Source) -> Scene:
     device_files.put_device_files(data, {})  # of devices that options have added
     origin = replace(source, tables=data, options=(), set_by=set_by)
 
-    moved: dict[int, int] = {}
+    moved: dict[Path, int] = {}
 
     def refuse(problems: Iterable[Problem]) -> None:
         if found := [origin.finding(written_path(path, moved), why) for path, why in problems]:
@@ -113,9 +114,10 @@ def from_source(source: Source) -> Scene:
     refuse(islice(find_unrepresentable(data), COUNTED))
     refuse([*of_devices.problems, *device_files.find_old_keys(data), *device_files.put_likes(data)])
     flatten(data)
-    data, moved = with_signals(data)
-    wrong: list[Problem] = []
-    start = _start_time(data)
+    start, wrong = _start_time(data), list[Problem]()
+    data, made = with_signals(data, start, wrong)
+    refuse(wrong)
+    moved |= made
     for path, recorded in find_traces(data):
         with collect_problem(wrong, (*path, "rate")):
             file = recorded.pop("rate")["trace"]

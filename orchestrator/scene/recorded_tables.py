@@ -96,15 +96,49 @@ def read_recorded_table(
     at the times that the file has; `true` is 1, `false` 0. Raises ValueError for unknown keys,
     columns and units, for a unit of another dimension, and for what is no finite number, with its
     line; InputFault for a file that cannot be read."""
+    path, rows, places, _ = _read_rows(given)
+    factors = _factors(given.get("units"), len(places), columns)
+    each = [[_entry(path, *row, place, place != places[0]) for place in places] for row in rows]
+    times = _seconds(rows, places[0], factors[0], start)
+    return [
+        [time, *(value * f for value, f in zip(values[1:], factors[1:], strict=True))]
+        for time, values in zip(times, each, strict=True)
+    ]
+
+
+def read_recorded_texts(given: Mapping[str, Any]) -> list[list[Any]] | None:
+    """The rows (time, texts), the times at which the file has them; None where its first row has
+    numbers, which are not in quotes unless the time is, too. Raises as `read_recorded_table`
+    does."""
+    path, rows, places, quoted = _read_rows(given)
+    in_quotes = places[0] not in quoted and quoted & {*places[1:]}
+    fields = rows[0][1]
+    first = [fields[p].strip().lower() for p in places[1:] if p < len(fields)]
+    if not in_quotes and all(c in ("", "true", "false") or _number(c) is not None for c in first):
+        return None
+    for row in rows:
+        _entry(path, *row, places[0], False)
+    units = given.get("units") or ["s"]
+    if units[1:] and any(units[1:]):
+        raise ValueError(f"units = {units}: texts have none: give that of the time alone")
+    times = _seconds(rows, places[0], _factors(units[:1], 1, ())[0], None)
+    texts = ([fields[p] if p < len(fields) else "" for p in places[1:]] for _, fields in rows)
+    return [[time, *row] for time, row in zip(times, texts, strict=True)]
+
+
+def _read_rows(
+    given: Mapping[str, Any],
+) -> tuple[Path, list[tuple[int, list[str]]], list[int], set[int]]:
+    """The file, its rows with their lines, the places of the columns that are asked for, and of
+    those that have quotes in the first row."""
     if odd := given.keys() - _KEYS:
         raise ValueError(unknown("key of a recorded table", min(odd), _KEYS))
     path = Path(str(given["path"]))
     text = text_files.read_text(path, "a log", LARGEST)
-    lines = list(csv.reader(text.splitlines()))
+    lines = list(csv.reader(text.splitlines(keepends=True)))
     names = [name.strip() for name in lines[0]] if lines else []
-    headed = any(_number(name) is None for name in names)
+    headed = bool(names) and _number(names[0]) is None
     places = [*_places(given, names if headed else [str(i + 1) for i in range(len(names))])]
-    factors = _factors(given.get("units"), len(places), columns)
     rows = [
         (number, fields)
         for number, fields in enumerate(lines[headed:], 1 + headed)
@@ -112,15 +146,25 @@ def read_recorded_table(
     ]
     if not rows:
         raise ValueError(f"{path}: it has no rows")
-    each = [[_entry(path, *row, place, place != places[0]) for place in places] for row in rows]
+    return path, rows, places, _find_quoted(text.splitlines()[rows[0][0] - 1])
+
+
+def _find_quoted(line: str) -> set[int]:
+    """The places of fields in quotes, if all others are numbers."""
+    try:
+        fields = next(csv.reader([line], quoting=csv.QUOTE_NONNUMERIC))
+    except (ValueError, csv.Error):
+        return set()
+    return {i for i, field in enumerate(fields) if isinstance(field, str)}
+
+
+def _seconds(
+    rows: Sequence[tuple[int, list[str]]], place: int, factor: float, start: float | None
+) -> Iterator[float]:
     # Decimals subtract and scale exactly: 9 ms are the number that 0.009 is.
-    times, scale = [Decimal(fields[places[0]].strip()) for _, fields in rows], repr(factors[0])
+    times, scale = [Decimal(fields[place].strip()) for _, fields in rows], repr(factor)
     begin = Decimal(0) if start is None else Decimal(repr(start)) - times[0] * Decimal(scale)
-    seconds = (float(time * Decimal(scale) + begin) for time in times)
-    return [
-        [time, *(value * f for value, f in zip(values[1:], factors[1:], strict=True))]
-        for time, values in zip(seconds, each, strict=True)
-    ]
+    return (float(time * Decimal(scale) + begin) for time in times)
 
 
 def _places(given: Mapping[str, Any], names: Sequence[str]) -> Iterator[int]:

@@ -303,9 +303,8 @@ class WrittenScene(Scene):
     """The same with its options applied."""
     written: Scene = field(compare=False, repr=False)
     """The scene as it was read, before any change in Python."""
-    signals: Mapping[int, int] = field(compare=False, repr=False, default_factory=dict)
-    """By the index of an FMU that is made for a connection from a signal, that of the
-    connection."""
+    signals: Mapping[Path, int] = field(compare=False, repr=False, default_factory=dict)
+    """Of what is made for connections from signals, as of `written_path`."""
 
     def place(self, path: Path, message: str) -> Finding:
         return self.origin.finding(written_path(path, self.signals), message)

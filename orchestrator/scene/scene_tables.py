@@ -103,16 +103,23 @@ class Wire:
     """Whether to convert between the units of the two ends."""
 
 
+RecordRate = Annotated[float, Quantity("Hz", gt=0, le=1_000_000)]
+
+
 @dataclass(frozen=True, kw_only=True)
 class RecordTable:
     """What a run writes. Outputs that are neither written nor read are not fetched from their
     FMUs:
     [what is recorded](fmus.md#what-is-fetched-and-recorded)."""
 
-    signals: Literal["all", "connected", "none"] | tuple[str, ...] = "all"
+    signals: Literal["all", "connected", "none"] | tuple[str, ...] | Mapping[str, RecordRate] = (
+        "all"
+    )
     """all: every output; connected: those that a connection reads; none: no table; or a list of
     FMUs, for all of their outputs, of variables `fmu.port` and entries `fmu.port[1]`: outputs,
-    inputs, locals and parameters. `*` stands for anything: `plant.*` are all variables of one."""
+    inputs, locals and parameters. `*` stands for anything: `plant.*` are all variables of one. Or a
+    table of these with the rate (Hz) of their rows, of which the first that fits a variable
+    counts, at most that of its FMU: `{ "plant.*" = 512, "controller.*" = 32 }`."""
     every: Annotated[int, Quantity("1", ge=1, le=1_000_000)] = 1
     """A rate gets a row every so many of its communication points, from t = 0 on, and at the last
     one within the scene's duration."""

@@ -4,14 +4,16 @@
     from = { table = { path = "log.csv", columns = ["time", "u"] }, interpolation = "hold" }
     to = "plant.u"
 
-is an [[fmu]] with the block `signal` and these settings, and a connection from its output y.
+is an [[fmu]] with the block `signal` and these settings, and a connection from its output y. A
+table of texts is the start value of its String, and an [[at]] for each other text that follows.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -22,12 +24,14 @@ from hapticlink.orchestrator.scene.extends import tables_of
 from hapticlink.orchestrator.scene.recorded_tables import (
     RecordedTable,
     read_recorded_table,
+    read_recorded_texts,
     si_unit,
 )
 from hapticlink.orchestrator.scene.scene_tables import OWN, Wire
+from hapticlink.orchestrator.scene.toml_keys import Path, Problem, collect_problem
 
 BLOCK = "signal"
-_Row = tuple[Annotated[float, Quantity(OWN)], ...]
+_Row = tuple[Annotated[float, Quantity(OWN)] | str, ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +41,8 @@ class SignalSource:
 
     table: tuple[_Row, ...] | RecordedTable | None = None
     """Rows of time (s) and values, sorted by time, the ends held; or a recorded log,
-    `{ path, columns, units }`, such as the CSV of another run."""
+    `{ path, columns, units }`, such as the CSV of another run. Texts of a String are held until the
+    next row."""
     interpolation: Interpolation = "linear"
     """Between rows: linear, the cubic spline whose rate is 0 at both ends, or each row held until
     the next (steps)."""
@@ -58,16 +63,31 @@ class WrittenWire(Wire):
     """The output, `fmu.variable`; or [a table, log or formula](scenarios.md#inputs-over-time)."""
 
 
-def with_signals(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[int, int]]:
+def with_signals(
+    data: Mapping[str, Any], start: float, problems: list[Problem]
+) -> tuple[dict[str, Any], dict[Path, int]]:
     """The scene's tables with an FMU for each connection from a signal, which takes its steps with
-    the target; and by the index of such an FMU that of its connection."""
-    wires, fmus = tables_of(data, "connection"), tables_of(data, "fmu")
+    the target, and with an [[at]] for each change of a text; and of these, and of the connections
+    that are left, by their place the index of the connection. Adds a problem for each table of
+    texts that cannot be read. start: of the run (s)."""
+    wires, fmus, events = (tables_of(data, name) for name in ("connection", "fmu", "at"))
     rates = {f.get("name", f.get("replaces")): f.get("rate") for f in fmus}
     made: dict[int, dict[str, Any]] = {}
+    texts = set[int]()
+    moved: dict[Path, int] = {}
     for i, wire in enumerate(wires):
         if not isinstance(source := wire.get("from"), dict):
             continue
         target = str(wire.get("to"))
+        rows: list[list[Any]] | None = []
+        with collect_problem(problems, ("connection", i, "from", "table")):
+            rows = _read_texts(source)
+        if rows is not None:
+            texts.add(i)
+            first = len(events)
+            events += _set_texts(rows, start, target, fmus)
+            moved |= {("at", n): i for n in range(first, len(events))}
+            continue
         name = re.sub(r"\W+", "_", target).strip("_")
         while name in rates:
             name += "_"
@@ -75,10 +95,48 @@ def with_signals(data: Mapping[str, Any]) -> tuple[dict[str, Any], dict[int, int
         made[i] = {"name": name, "block": BLOCK, "settings": source}
         made[i] |= {} if rate is None else {"rate": rate}
         wires[i] = {"convert": _has_units(source), **wire, "from": f"{name}.y"}
-    if not made:
+    if not (made or texts):
         return dict(data), {}
-    moved = {len(fmus) + n: i for n, i in enumerate(made)}
-    return {**data, "fmu": [*fmus, *made.values()], "connection": wires}, moved
+    moved |= {("fmu", len(fmus) + n): i for n, i in enumerate(made)}
+    left = [i for i in range(len(wires)) if i not in texts]
+    moved |= {("connection", n): i for n, i in enumerate(left)}
+    changed = {"fmu": [*fmus, *made.values()], "connection": [wires[i] for i in left]}
+    return {**data, **changed, **({"at": events} if events else {})}, moved
+
+
+def _read_texts(source: Mapping[str, Any]) -> list[list[Any]] | None:
+    """The rows (time, texts) of a table of texts; None of other signals. Raises as
+    `read_recorded_table` does, and ValueError for an interpolation that texts do not have."""
+    table = source.get("table")
+    rows: list[list[Any]] | None = None
+    if isinstance(table, dict) and "path" in table:
+        rows = read_recorded_texts(table)
+    elif isinstance(table, list) and all(isinstance(row, list) for row in table):
+        rows = table if any(isinstance(x, str) for row in table for x in row[1:]) else None
+    if rows is None:
+        return None
+    if (how := source.get("interpolation", "hold")) != "hold":
+        raise ValueError(f"interpolation = {how!r}: texts are held until the next: leave it out")
+    for k, row in enumerate(rows):
+        if [*map(type, row[1:])] != [str] or type(row[0]) not in (int, float):
+            raise ValueError(f"row {k + 1}, {row}: with texts a row is a time (s) and one text")
+        if k and row[0] <= rows[k - 1][0]:
+            raise ValueError(f"row {k + 1}: {row[0]} does not come after {rows[k - 1][0]}")
+    return rows
+
+
+def _set_texts(
+    rows: list[list[Any]], start: float, target: str, fmus: list[dict[str, Any]]
+) -> Iterator[dict[str, Any]]:
+    """The [[at]] of texts from a start (s) on, of which the first is a start value of the FMU."""
+    name, _, port = target.partition(".")
+    before = sum(time <= start for time, _ in rows) or 1
+    for fmu in fmus:
+        if rows and name in (fmu.get("name"), fmu.get("replaces")):
+            fmu["start"] = {**(fmu.get("start") or {}), port: rows[before - 1][1]}
+    for (_, text), (time, newer) in pairwise(rows[before - 1 :]):
+        if newer != text:
+            yield {"time": time, "set": {target: newer}}
 
 
 def _has_units(source: Mapping[str, Any]) -> bool:

@@ -140,12 +140,14 @@ def _key_lines(text: str) -> dict[Path, int]:
     return lines
 
 
-def written_path(path: Path, moved: Mapping[int, int]) -> Path:
-    """Where a scene's file has what is at `path` of tables with an FMU for each connection from a
-    signal; `moved`: by the index of such an FMU that of its connection."""
-    if path[:1] == ("fmu",) and path[1:] and path[1] in moved:
-        return ("connection", moved[int(path[1])], "from", *path[3:])
-    return path
+def written_path(path: Path, moved: Mapping[Path, int]) -> Path:
+    """Where a scene's file has what is at `path` of tables with an FMU, or entries of `at`, for
+    each connection from a signal; `moved`: by the place of each of them, and of the connections
+    that are left, the index of the connection."""
+    if (i := moved.get(path[:2])) is None:
+        return path
+    rest = {"fmu": ("from", *path[3:]), "at": ("from", "table"), "connection": path[2:]}
+    return ("connection", i, *rest[str(path[0])])
 
 
 def place_of(path: Path, places: Mapping[Path, Place]) -> Place:

@@ -40,9 +40,13 @@ from hapticlink.orchestrator.system import (
     timed_events,
 )
 from hapticlink.orchestrator.system.assign_holds import assign, find_energy_ports
-from hapticlink.orchestrator.system.connections import check_partial_vectors, connect, with_texts
+from hapticlink.orchestrator.system.connections import check_partial_vectors, connect
 from hapticlink.orchestrator.system.fmu_files import fmu_files
-from hapticlink.orchestrator.system.outputs_to_record import choose_outputs, read_recorded
+from hapticlink.orchestrator.system.outputs_to_record import (
+    choose_outputs,
+    choose_slower,
+    read_recorded,
+)
 from hapticlink.orchestrator.system.start_values import separate_start_values
 from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
@@ -187,7 +191,7 @@ def _assemble(
     fmus = tuple(with_sizes(u, time) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
     connections = _connections(scene, fmus, problems)
-    fmus = tuple(read_recorded(with_texts(u, connections), scene.record) for u in fmus)
+    fmus = tuple(read_recorded(u, scene.record, connections) for u in fmus)
     if len(tables) < len(scene.fmu):  # what names an FMU that cannot be read may be right
         raise _faults(scene, problems)
     energy = find_energy_ports(scene, fmus, connections)
@@ -212,6 +216,7 @@ def _assemble(
     problems += replacements.check_replacements(scene, replaced, rows, system)
     changes = (*_coupling_ramps(scene, system), *timed_events.changes(scene, system, problems))
     written = choose_outputs(scene.record, system, problems)
+    slower = choose_slower(scene.record, system, problems)
     if problems:
         raise _faults(scene, problems)
     mapped = {
@@ -220,7 +225,7 @@ def _assemble(
     }
     return replace(
         system,
-        recording=Recording(written, scene.record.every),
+        recording=Recording(written, scene.record.every, slower),
         replacements=replacements.replacements(replaced, rows, system, mapped),
         changes=changes,
     )

@@ -55,7 +55,7 @@ NOWHERE = {
     "closed-loop-direct: its held poses are the set position of F_drift; [[spring]] declares "
     "those of other FMUs (docs/passivity.md, pspm)",
     "power": "no connection across rates carries power that is known. One does in "
-    "closed-loop-direct; [[power]] declares those of other FMUs (docs/passivity.md, Energy)",
+    "closed-loop-direct; a [[power]] (docs/passivity.md, Energy) declares it of an FMU of others",
 }
 """Why a default hold fits no connection, by what it needs."""
 
@@ -69,7 +69,11 @@ def _check_holds(scene: Scene, system: System) -> Iterator[Problem]:
     sets = system.energy.springs if needs == "spring" else ()
     nearly = [r for r in default if springs.spring(r.connection, sets)]
     if default and not nearly:
-        yield ("hold",), f"{scene.hold!r} fits nowhere here: {NOWHERE[needs]}"
+        into = [r.connection for r in default if not system.fmu[r.connection.target].sampled]
+        c = into[0] if into else default[0].connection
+        here = f': effort = "{c.target}.{c.target_port}", displacement = an output of {c.target}'
+        what = f"{NOWHERE[needs]}{here * (needs == 'power')}"
+        yield ("hold",), f"{scene.hold!r} fits nowhere here: {what}"
     for r in asked:
         if r in nearly or r not in default:
             path: Path = ("hold",) if r.key == "hold" else ("holds", r.key or "")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 
 from hapticlink.orchestrator.fmi.description import Description
@@ -46,17 +46,17 @@ def connect(
         yield path, Connection(source, output, target, entry, scalars, inputs)
 
 
-def with_texts(fmu: Fmu, connections: Iterable[Connection]) -> Fmu:
-    """The FMU with those Strings and Binaries among its scalars that are connected: each is read or
-    set at every communication point, by Python."""
+def with_texts(fmu: Fmu, connections: Iterable[Connection], recorded: Collection[str]) -> Fmu:
+    """The FMU with those Strings and Binaries among its scalars that are connected or `recorded`:
+    each is read or set at every communication point, by Python."""
     taken = [s for c in connections if c.source == fmu.name for s in c.outputs]
     given = [s for c in connections if c.target == fmu.name for s in c.inputs]
-    texts = dict.fromkeys(s.name for s in (*taken, *given) if s.type in WRITTEN)
+    texts = {s.port for s in (*taken, *given) if s.type in WRITTEN} | {*recorded}
     if not texts:
         return fmu
     scalars, strings = list(fmu.description.scalars), list[Scalar]()
     for s in fmu.description.strings:
-        (scalars if s.name in texts else strings).append(s)
+        (scalars if s.port in texts else strings).append(s)
     about = replace(fmu.description, scalars=tuple(scalars), strings=tuple(strings))
     return replace(fmu, description=about)
 
@@ -92,7 +92,8 @@ def _convert(
     text = next((s for s in (*outputs, *inputs) if s.type in WRITTEN), None)
     if text and {(s.type, s.causality) for s in inputs} != {(outputs[0].type, "input")}:
         what = f"a {text.type} output is connected to a {text.type} input only"
-        raise ValueError(f"{text.name} is a {text.type}: {what}")
+        table = "; a String input also takes a table of texts, those of a CSV in quotes"
+        raise ValueError(f"{text.name} is a {text.type}: {what}{table * (text in inputs)}")
     if len(outputs) != len(inputs):
         sizes = f"{wire.from_} has {len(outputs)} numbers, {wire.to} takes {len(inputs)}"
         raise ValueError(f"{sizes}; connect their entries one by one")

@@ -175,6 +175,15 @@ class EnergyPorts:
 
 
 @dataclass(frozen=True)
+class SlowerTable:
+    """Outputs, `fmu.output`, that have a row at every so many communication points of a clock."""
+
+    clock: str
+    every: int
+    outputs: frozenset[str]
+
+
+@dataclass(frozen=True)
 class Recording:
     """What is written."""
 
@@ -182,6 +191,13 @@ class Recording:
     """The outputs, `fmu.output`; None for all."""
     every: int = 1
     """Number of communication points of a clock for which it gets a row."""
+    slower: Mapping[str, SlowerTable] = field(default_factory=dict)
+    """By name, the tables of outputs that have fewer rows, which are in no other."""
+
+    def tables(self, clock: str) -> dict[str, int]:
+        """The names of a clock's tables, each with its `every`."""
+        slower = {n: self.every * t.every for n, t in self.slower.items() if t.clock == clock}
+        return {clock: self.every} | slower
 
 
 @dataclass(frozen=True)

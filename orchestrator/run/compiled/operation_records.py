@@ -55,7 +55,8 @@ class Machine:
         self._points: list[tuple[float, float]] = []
         self._fmus = self._array("fmus", structures.Fmu, len(system.fmus))
         self._setters = self._array("setters", structures.Setter, 2 * len(system.fmus))
-        self._tables = self._array("tables", structures.Table, len(system.timeline.clocks))
+        n_tables = len(system.timeline.clocks) + len(system.recording.slower)
+        self._tables = self._array("tables", structures.Table, n_tables)
         self._holds = self._array("holds", ctypes.c_void_p, len(system.connections))
         self._meters = self._array("meters", ctypes.c_void_p, len(simulation.meters.of))
         self._indices: dict[str, dict[Any, int]] = {kind: {} for kind in KINDS}
@@ -161,8 +162,8 @@ class Machine:
                 return self._hold(connection)
             case OfMeter(connection):
                 return self._meter(connection)
-            case Record(clock):
-                return self._table(clock)
+            case Record(table):
+                return self._table(table)
             case _:
                 assert isinstance(instruction, StopWhen)
                 condition = system.ends_when

@@ -197,7 +197,7 @@ def test_a_text_is_set_at_a_given_time(tmp_path):
     ("more", "said"),
     [
         ('hold = "foh"\n', "word is a text, which can have no values in between; take zoh"),
-        (ISOLATED, "word is a text, which is passed on within one process"),
+        (ISOLATED, "word is a text, which is read and set within one process"),
     ],
 )
 def test_a_text_has_no_slope_and_leaves_no_process(tmp_path, more, said):

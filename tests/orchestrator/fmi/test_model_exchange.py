@@ -29,10 +29,13 @@ def started(**values: float) -> str:
     return "".join(f"start.{name} = {value}\n" for name, value in values.items())
 
 
-def of_fmpy(path: Path, rate: int, duration: float, **start: float) -> np.ndarray:
+def of_fmpy(
+    path: Path, rate: int, duration: float, begin: float = 0.0, **start: float
+) -> np.ndarray:
     return simulate_fmu(
-        path, validate=False, fmi_type="ModelExchange", stop_time=duration,
-        output_interval=1 / rate, start_values=start, record_events=False,
+        path, validate=False, fmi_type="ModelExchange", start_time=begin,
+        stop_time=begin + duration, output_interval=1 / rate, start_values=start,
+        record_events=False,
     )  # fmt: skip
 
 
@@ -88,6 +91,23 @@ def test_time_events_are_at_their_times_and_nothing_is_evaluated_beyond(tmp_path
     assert table["one.beyond"].max() == 0
     inside = ran(tmp_path, ONE + started(every=0.07), "duration=1.0", "haptics.rate=10").haptics
     np.testing.assert_array_equal(inside["one.alarms"], np.floor(inside["time"] / 0.07 + 1e-9))
+
+
+@pytest.mark.parametrize("fmi", ["2", "3"])
+@pytest.mark.parametrize("begin", [2.0, 2.25])
+def test_events_before_the_start_are_made_up_for_as_by_fmpy(tmp_path, fmi, begin):
+    """It tells its next event, 0.5 s, at the start; FMPy's first row is before that event."""
+    path = equations_fmu(tmp_path, fmi)
+    start = {"every": 0.5, "level": -9.0}
+    at = f"start_time={begin}", "duration=1.0"
+    found = ran(tmp_path, ONE + started(**start), *at).haptics
+    np.testing.assert_array_equal(found["one.alarms"], np.floor(found["time"] / 0.5))
+    np.testing.assert_allclose(found["one.x"], np.exp(-K * (found["time"] - begin)), atol=1e-4)
+    theirs = of_fmpy(path, 64, 1.0, begin, **start)
+    for name in ("alarms", "x"):
+        regular = np.isin(theirs["time"], found["time"])  # it has rows in the past, too
+        last = {t: v for t, v in zip(theirs["time"][regular], theirs[name][regular], strict=True)}
+        np.testing.assert_allclose(found[f"one.{name}"][1:], [*last.values()][1:], atol=1e-4)
 
 
 @pytest.mark.parametrize("fmi", ["2", "3"])

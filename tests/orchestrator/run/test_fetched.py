@@ -210,11 +210,10 @@ def test_a_pattern_that_fits_nothing_is_refused(tmp_path):
         simulate(SCENE, tmp_path, ('record.signals=["virtual_mechanism.nope*"]',))
 
 
-def test_a_text_and_an_fmu_that_gives_no_number_are_told(tmp_path):
-    slave(tmp_path, "Says", ("input", {"u": 0.0}), ("output", {"word": "none"}))
-    for name, why in (("says", "has no output that is a number"), ("says.word", "is a String")):
-        with pytest.raises(SceneFault, match=f"'{name}' {why}"):
-            ran_foreign(tmp_path, fmu_table("says", "Says"), f"record.signals=['{name}']")
+def test_an_fmu_without_the_output_is_told(tmp_path):
+    slave(tmp_path, "Hears", ("input", {"u": 0.0}))
+    with pytest.raises(SceneFault, match=r"'hears' has no output; 'hears\.\*' are all of its"):
+        ran_foreign(tmp_path, fmu_table("hears", "Hears"), "record.signals=['hears']")
 
 
 def test_a_run_without_the_pose_of_its_point_is_drawn(tmp_path):
@@ -222,3 +221,57 @@ def test_a_run_without_the_pose_of_its_point_is_drawn(tmp_path):
     names = '["virtual_mechanism.q", "haptic_device.x_true"]'
     run = hl.run(SCENE, {"duration": 0.1, "record.signals": json.loads(names)}, out=tmp_path)
     assert not (run.folder / "mechanism.png").exists()
+
+
+SLOWER = {"haptic_device.x": 64, "virtual_environment.*": 512, "virtual_mechanism.*": 32}
+
+
+@pytest.mark.parametrize("kind", ["csv", "rows", "memory"])
+@pytest.mark.parametrize("every", [1, 2])
+def test_each_signal_has_a_rate_of_rows_of_its_own(tmp_path, kind, every):
+    """`every` counts their rows, too; a rate beyond that of the FMU is the FMU's."""
+    whole = hl.run("single-body", {"duration": 0.3}, figures=False)
+    options = {"duration": 0.3, "record.every": every, "record.signals": SLOWER}
+    if kind == "memory":
+        found = hl.run("single-body", options, figures=False)
+    else:
+        options["record.format"] = kind
+        hl.run("single-body", options, out=tmp_path, figures=False)
+        found = hl.load(tmp_path)
+    assert {*found.tables} == {"haptics", "haptics_32hz", "haptics_64hz", "graphics"}
+    for table, signal, step in (
+        ("haptics_64hz", "haptic_device.x", 8),
+        ("haptics_32hz", "virtual_mechanism.q", 16),
+        ("graphics", "virtual_environment.q", 1),
+    ):
+        source = whole.tables[table.partition("_")[0]]
+        last = len(source["time"]) - 1
+        rows = sorted({*range(0, last, step * every), last})  # there is always the last one
+        np.testing.assert_array_equal(found.tables[table]["time"], source["time"][rows])
+        np.testing.assert_array_equal(found[signal], source[signal][rows])
+    assert "haptic_device.x" in found.record.not_recorded  # in every row of its rate
+
+
+def test_what_has_fewer_rows_is_in_no_finding(tmp_path):
+    """Beside positions of another time a handle would be far from its point."""
+    rates = {"haptic_device.*": 64, "*": 512}
+    found = hl.run("single-body", {"duration": 0.3, "record.signals": rates}, figures=False)
+    assert "not recorded in every row, and so not reported or drawn in full: tracking" in str(found)
+    assert "from the operational point" not in str(found)
+
+
+@pytest.mark.parametrize(
+    ("signals", "options", "why"),
+    [
+        ({"haptic_device.x": 60}, {}, "60 Hz is no whole part of the 512 Hz of haptics, at whose "
+         "communication points rows are: take 56.8889 or 64"),
+        ({"virtual_environment.q": 7}, {"graphics.rate": {"min": 20, "max": 30, "seed": 1}},
+         "the rate of graphics varies, of which 7 Hz is no part"),
+        ({"nobody.x": 64}, {}, "'nobody.x' is no FMU, nor variable of one"),
+        ({"haptic_device.x": 0}, {}, "0 is out of range: give a number > 0"),
+    ],
+)  # fmt: skip
+def test_a_rate_that_rows_cannot_have_is_refused(signals, options, why):
+    with pytest.raises(SceneFault) as refused:
+        hl.run("single-body", {"record.signals": signals, **options}, figures=False)
+    assert why in str(refused.value)

@@ -2,7 +2,9 @@
 fit is refused by name."""
 
 import csv
+import hashlib
 import json
+import re
 import signal
 import subprocess
 import sys
@@ -194,6 +196,29 @@ def test_a_file_that_is_no_state(small, tmp_path, change, why):
     path.write_bytes(change(small.read_text()).encode("latin-1"))
     with pytest.raises(InputFault, match=why):
         hl.run(path)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ('"layout"', '"other"'),  # what reads the file misses it
+        ('"guid"', '"other"'),  # what compares it with the scene
+        ('"bounds"', '"other"'),  # what puts the run into it
+        ('{"table": [', '{"table": 1, "rest": ['),
+        ('"array": [', '"array": [1, '),
+        ('{"table"', '"table"'),  # no JSON any more
+    ],
+)
+def test_content_that_was_changed_with_its_checksum_is_a_clear_error(small, tmp_path, change):
+    first, _, body = small.read_text().split("\n", 2)
+    body = body.replace(*change)
+    path = tmp_path / "a.state"
+    path.write_text(f"{first}\n{hashlib.sha256(body.encode()).hexdigest()}\n{body}")
+    try:
+        found = hl.run(path).run["fault"]["message"]
+    except InputFault as refused:
+        found = str(refused)
+    assert re.search(r"a\.state: changed since .* save the state again", found)
 
 
 @pytest.mark.parametrize(

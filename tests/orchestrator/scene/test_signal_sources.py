@@ -162,7 +162,71 @@ def test_settings_that_give_no_block_are_refused_with_their_line(tmp_path):
         hl.run(formula, {"connection.0.from.formula": "y"})
 
 
-def test_a_text_input_takes_no_number(tmp_path):
-    variables = ("input", {"s": "a"}), ("output", {"y": 0.0})
-    with pytest.raises(SceneFault, match="s is a String"):
-        hl.run(scene(tmp_path, variables, {"s": "{ formula = 't' }"}))
+TEXT = ("input", {"s": "a"}), ("output", {"said": "-"})
+SAYS = 'values["said"] = values["s"]'
+CSV = 'time,code,mode\n0,"1",shut\n250,"2","open, wide"\n500,"2","open, wide"\n750,"3",shut\n'
+
+
+@pytest.mark.parametrize(
+    ("of", "words"),
+    [
+        ('[[0.0, "x"], [0.25, "y"], [0.5, "y"], [0.75, ""]]', ["x", "y", "y", ""]),
+        ('[[0.25, "x"], [0.75, "y"]]', ["x", "x", "x", "y"]),  # the ends are held
+        ('{ path = "log.csv", columns = ["time", "mode"], units = ["ms"] }',
+         ["shut", "open, wide", "open, wide", "shut"]),
+        ('{ path = "log.csv", columns = ["time", "mode"], units = ["ms", ""] }',
+         ["shut", "open, wide", "open, wide", "shut"]),
+        ('{ path = "plain.csv" }', ["1", "2", "2", "2"]),  # quotes make it a text
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("start_time", [0.0, 0.5])
+def test_a_text_is_fed_from_a_table(tmp_path, of, words, start_time):
+    """Each from the step on that begins at its time, and the first from initialisation on."""
+    (tmp_path / "log.csv").write_text(CSV)
+    (tmp_path / "plain.csv").write_text('0.0,"1"\n0.25,"2"\n')
+    path = scene(tmp_path, TEXT, {"s": f"{{ table = {of} }}"}, SAYS)
+    options = {"record.signals": ["fed.*"], "start_time": start_time}
+    run = hl.run(path, options, figures=False)
+    times = np.floor(run.tables["100hz"]["time"] * 4 + 1e-9).astype(int)
+    expected = [words[min(k, 3)] for k in times]
+    assert [*run["fed.said"][:-1]] == expected[:-1]
+    assert run["fed.s"][0] == expected[0]
+
+
+def test_a_run_feeds_a_text_of_another_one(tmp_path):
+    first = scene(tmp_path, TEXT, {"s": '{ table = [[0.0, "x"], [0.3, "y"], [0.6, "x"]] }'}, SAYS)
+    hl.run(first, {"record.signals": ["fed.*"]}, out=tmp_path / "first", figures=False)
+    of = '{ table = { path = "first/100hz.csv", columns = ["time", "fed.said"] } }'
+    (second := tmp_path / "second").mkdir()
+    again = scene(second, TEXT, {"s": of.replace("first/", str(tmp_path / "first") + "/")}, SAYS)
+    found = hl.run(again, {"record.signals": ["fed.said"]}, figures=False)
+    assert [*found["fed.said"]] == [*hl.load(tmp_path / "first")["fed.said"]]
+
+
+@pytest.mark.parametrize(
+    ("of", "said"),
+    [
+        ('{ table = [[0.0, "a"]], interpolation = "linear" }', "texts are held until the next"),
+        ('{ table = [[0.0, "a"], [0.1, 2.0]] }', "row 2, [0.1, 2.0]: with texts a row is a time"),
+        ('{ table = [[0.1, "a"], [0.1, "b"]] }', "row 2: 0.1 does not come after 0.1"),
+        ('{ table = { path = "log.csv", columns = ["time", "mode"], units = ["ms", "N"] } }',
+         "texts have none: give that of the time alone"),
+        ('{ table = { path = "log.csv", columns = ["mode", "code"] } }', "'shut' is no number"),
+        ('{ table = { path = "bare.csv" } }', "takes a table of texts, those of a CSV in quotes"),
+        ("{ formula = 't' }", "s is a String"),
+    ],
+)  # fmt: skip
+def test_what_feeds_no_text_is_refused_at_its_connection(tmp_path, of, said):
+    (tmp_path / "log.csv").write_text(CSV)
+    (tmp_path / "bare.csv").write_text("time,code\n0.0,1\n")
+    with pytest.raises(SceneFault) as refused:
+        hl.run(scene(tmp_path, TEXT, {"s": of}))
+    assert said in str(refused.value)
+    assert "connection[0]" in str(refused.value)
+    assert len(str(refused.value).splitlines()) == 2
+
+
+def test_a_number_takes_no_text(tmp_path):
+    of = "{ table = [[0.0, 'a'], [0.5, 'b']] }"
+    with pytest.raises(SceneFault, match=r"connection\[0\]\.from\.table.*takes a number"):
+        hl.run(scene(tmp_path, REAL, {"u": of}))
