@@ -5,12 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 from hapticlink.analysis.findings import summary
+from hapticlink.analysis.findings.summary import Findings
 from hapticlink.api.result import Run
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -21,8 +23,13 @@ from hapticlink.orchestrator.network.served_part import NOWHERE, Servers
 from hapticlink.orchestrator.plan import explain
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results import folder_lock, folders
+from hapticlink.orchestrator.results.read_results import (
+    Results,
+    read_into_memory,
+    with_record,
+    without_rows,
+)
 from hapticlink.orchestrator.results.read_results import load as read_tables
-from hapticlink.orchestrator.results.read_results import read_into_memory, without_rows
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, read_save_times
@@ -156,8 +163,7 @@ def _in_memory(simulated: Callable[..., Experiment], tables: bool) -> Run:
         if not tables:
             return Run(None, ended.run, {})
         results = read_into_memory(ended.results)
-    found = summary.find(results)
-    return Run(None, ended.run | found.record, without_rows(results), numbers=found.numbers)
+    return _result(None, results, summary.find(results), ended.run)
 
 
 def _in_folder(
@@ -181,16 +187,23 @@ def _describe_run(
     if not ended.outcome.published:
         return Run(None, results.run, results.tables)
     found = summary.find(results)
-    run, files = results.run | found.record, _write_files(ended, figures)
+    run, files = results.run, _write_files(ended, figures)
     with _tell_of_missing_files(folder, ended):
         for names in islice(files, 2):
-            run = folders.add(folder, names, found.record)
+            run = folders.add(folder, names, found.added)
     if answer:
-        answer(Run(folder, run, without_rows(results), numbers=found.numbers))
+        answer(_result(folder, results, found, run))
     with _tell_of_missing_files(folder, ended):
         for names in files:
-            run = folders.add(folder, names, found.record)
-    return Run(folder, run, without_rows(results), numbers=found.numbers)
+            run = folders.add(folder, names, found.added)
+    return _result(folder, results, found, run)
+
+
+def _result(folder: Path | None, results: Results, found: Findings, run: dict[str, Any]) -> Run:
+    """What is returned of results, of which `run` is what run.json says."""
+    told = Run(folder, run | found.added, without_rows(results), numbers=found.numbers)
+    record = replace(found.record, files=run["files"], scene=run["scene"])
+    return with_record(told, record, results.known_scene)
 
 
 @contextmanager

@@ -23,7 +23,6 @@ from hapticlink.commands.progress import progress
 from hapticlink.commands.stop_key import stop_key, wait_for_enter
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.orchestrator.scene.blocks import driver_of
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -120,6 +119,7 @@ def run(
         hapticlink run closed-loop --real-time --device simulated-board
     """
     import hapticlink as hl
+    from hapticlink.orchestrator.scene.blocks import driver_of
 
     if not (scene or state):
         raise InputFault("give the name or path of a scene, or the state of a run (--from)")

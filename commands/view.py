@@ -18,7 +18,6 @@ from hapticlink.commands.stop_key import wait_for_enter
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.orchestrator.scene.blocks import driver_of
 
 FIRST = "closed-loop-direct"
 """The scene that is shown where none is named: in it the rate is felt."""
@@ -105,6 +104,7 @@ def view(
     with address.start_server(token, *second_run) as link:
         import hapticlink as hl
         from hapticlink.api.runs import with_board
+        from hapticlink.orchestrator.scene.blocks import driver_of
         from hapticlink.orchestrator.scene.overrides import write_options
         from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
 

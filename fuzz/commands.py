@@ -27,7 +27,8 @@ from hapticlink import commands
 from hapticlink.commands import internal_error
 from hapticlink.commands import run as run
 from hapticlink.orchestrator import experiment as experiment
-from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.orchestrator.base.type_adapters import adapter
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.figures import run_figures as run_figures
 
 ENOUGH = 0.5
@@ -48,7 +49,7 @@ class Place(Room):
 
     def __init__(self, folder: Path) -> None:
         super().__init__(folder)
-        adapter()  # once, not in each process
+        adapter(Scene)  # once, not in each process
         self.out, self.earlier, self.here = (folder / name for name in ("out", "earlier", "here"))
         self.here.mkdir()
         status, said = self.forked(["run", "pendulum", "--out", str(self.earlier)])

@@ -31,6 +31,7 @@ from hapticlink.orchestrator.results.read_results import (
     Results,
     Table,
     load,
+    with_record,
 )
 from hapticlink.orchestrator.results.run_folder import RunFolder
 from hapticlink.orchestrator.results.run_record import (
@@ -91,7 +92,7 @@ class Experiment:
             record = RunRecord(**vars(self.before), **vars(self.ending))
             if not self.memory:
                 try:
-                    return load(self.folder, from_rows=True, record=record)
+                    return with_record(load(self.folder, True, record), record, self.scene)
                 except InputFault as why:  # which this run has written
                     raise self.outcome.fault or Fault(
                         f"the results are gone, or were changed while the run wrote them: {why}"
@@ -109,16 +110,15 @@ class _ResultsInMemory(Results):
     """Those of an experiment whose rows are in no file; its run.json is made where it is asked
     for."""
 
-    _experiment: Experiment
+    _made: Experiment
 
-    def __init__(
-        self, experiment: Experiment, tables: Mapping[str, Table], record: RunRecord
-    ) -> None:
-        vars(self).update(folder=None, tables=tables, record=record, _experiment=experiment)
+    def __init__(self, made: Experiment, tables: Mapping[str, Table], record: RunRecord) -> None:
+        with_record(self, record, made.scene)
+        vars(self).update(folder=None, tables=tables, _made=made)
 
     @cached_property
     def run(self) -> dict[str, Any]:
-        return self._experiment.run
+        return self._made.run
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ from typing import Any
 
 from hapticlink.orchestrator.base import plugins
 from hapticlink.orchestrator.base.errors import Finding, InputFault, SceneFault
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.plan.schemes import SCHEMES as SCHEMES  # registers the schemes
 from hapticlink.orchestrator.results.state_file import SUFFIX, expect_state, read_state
 from hapticlink.orchestrator.scene import overrides
@@ -18,7 +19,7 @@ from hapticlink.orchestrator.scene.find_scene import find_scene
 from hapticlink.orchestrator.scene.hold_tables import write_hold_tables
 from hapticlink.orchestrator.scene.overrides import Options
 from hapticlink.orchestrator.scene.read_and_check import from_source
-from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
+from hapticlink.orchestrator.scene.scene import Scene, WrittenScene
 from hapticlink.orchestrator.scene.scene_source import Source
 
 
@@ -97,7 +98,7 @@ def require_start(scene: Scene, takes: Container[str] = ()) -> Scene:
 
 def write_tables(scene: Scene) -> dict[str, Any]:
     """The tables of a scene as it is, which are read as those of a file."""
-    tables: dict[str, Any] = adapter().dump_python(
+    tables: dict[str, Any] = adapter(Scene).dump_python(
         scene.plain(), mode="json", by_alias=True, exclude_none=True
     )
     write_hold_tables(tables)

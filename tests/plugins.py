@@ -15,9 +15,10 @@ import hapticlink.commands.run, hapticlink.orchestrator.experiment
 import hapticlink.visualization.figures.run_figures
 from matplotlib.figure import Figure
 from hapticlink.commands import main
-from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.visualization.figure_files import encode
-adapter()
+adapter(Scene)
 figure = Figure()
 figure.subplots().set_title("warm")
 figure.legend(figure.axes[0].plot([0.0, 1.0]), ["one"])

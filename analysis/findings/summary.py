@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby, islice
 from typing import Any, NamedTuple
 
@@ -25,6 +26,7 @@ from hapticlink.analysis.findings.tracking import (
 )
 from hapticlink.analysis.findings.user_port import allowance, find_other_pushes, tolerated_energy
 from hapticlink.components.specs.joint_types import JOINT_TYPES
+from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.base.signal_names import (
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
@@ -47,29 +49,29 @@ from hapticlink.orchestrator.base.signal_names import (
 )
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.results.read_results import TABLES, Results
-from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors, content
+from hapticlink.orchestrator.results.run_record import PortEnergy, RunRecord, StepErrors
 from hapticlink.orchestrator.scene.start_pose import describe_start_outside
 from hapticlink.orchestrator.system.system import Replacement
 
 
 class Findings(NamedTuple):
-    """What run.json says of the results, warnings and the energy at the user's port, and the lines
-    of their numbers."""
+    """The record of a run with warnings, the energy at the user's port and what is noticed; what
+    this adds to run.json; and the lines of its numbers."""
 
-    record: dict[str, Any]
+    record: RunRecord
+    added: dict[str, Any]
     numbers: tuple[str, ...]
 
 
 def find(results: Results) -> Findings:
     """What the tables of a run show."""
     measures = Measures(results)
-    port, warned = measures.port, list(lines(results, measures))
-    held = measures.held_contacts
-    record = {"user_port": port and content(port), "warnings": warned}
-    if held:
-        record["held_contacts"] = content(held)
-    record["noticed"] = {user: content(each) for user, each in measures.noticed.items()}
-    return Findings(record, tuple(numbers(results, measures)))
+    added: dict[str, Any] = {"user_port": measures.port, "warnings": [*lines(results, measures)]}
+    if held := measures.held_contacts:
+        added["held_contacts"] = held
+    added["noticed"] = measures.noticed
+    record = replace(results.record, **added)
+    return Findings(record, plain(added), tuple(numbers(results, measures)))
 
 
 def ending(results: Results) -> str:

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import is_
 from typing import NamedTuple
 
 import casadi as ca
@@ -81,6 +82,9 @@ class Solved(NamedTuple):
     sides: tuple[ca.SX, ca.SX]
 
 
+Placed = tuple[dict[str, PlacedBody], list[Solved]]
+
+
 @dataclass(frozen=True)
 class _Turns:
     """Of a dyad at the start: the heading of its span (rad), the side of its elbow, and whole turns
@@ -106,6 +110,7 @@ class PoseCoordinates(DeviceModel):
         }
         self.start_place = self.start_pose[:k]
         self._turns = [self._at_start(dyad) for dyad in dyads]
+        self._known: tuple[tuple[object, ...], Placed] | None = None
         self._require_room()
 
     def handle(self, z: ca.SX, p: Parameters) -> ca.SX:
@@ -161,10 +166,14 @@ class PoseCoordinates(DeviceModel):
         spans = [dyad.J for dyad in self._placed(z, p)[1]]
         return ca.vertcat(*(-J for J in spans), *spans, self.range_rates(z, p))
 
-    def _placed(
-        self, y: ca.SX, p: Parameters, v: ca.SX | None = None
-    ) -> tuple[dict[str, PlacedBody], list[Solved]]:
-        """All bodies and dyads at a place, with their motion at v, 0 by default."""
+    def _placed(self, y: ca.SX, p: Parameters, v: ca.SX | None = None) -> Placed:
+        """All bodies and dyads at a place, with their motion at v, 0 by default. The last are
+        kept: what is asked of a place is asked in a row."""
+        if not (self._known and all(map(is_, self._known[0], (y, p, v)))):
+            self._known = (y, p, v), self._place_bodies(y, p, v)
+        return self._known[1]
+
+    def _place_bodies(self, y: ca.SX, p: Parameters, v: ca.SX | None) -> Placed:
         k, handle, none = y.numel(), self.device.handle, ca.SX(2, 1)
         v = ca.SX(k, 1) if v is None else v
         still = Point(none, ca.SX(2, k), none), ca.SX(1, k), ca.SX(0), ca.SX(0)

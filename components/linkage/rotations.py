@@ -19,6 +19,7 @@ and -16 q/(q' q) are the same rotation, so that each step ends with the shorter 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
 import casadi as ca
 import numpy as np
@@ -53,10 +54,16 @@ def cross(v: ca.SX) -> ca.SX:
 
 def about(axis: Axis, angle: ca.SX) -> ca.SX:
     """R (3 x 3) of a turn about an axis."""
+    along, across, beside = _parts(axis)
+    return ca.sparsify(along + ca.cos(angle) * across + ca.sin(angle) * beside)
+
+
+@cache
+def _parts(axis: Axis) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """a a', 1 - a a' and [a] of an axis a."""
     a = ca.SX(ca.sparsify(ca.DM(axis)))
     along = ca.sparsify(a @ a.T)
-    across = ca.sparsify(ca.SX.eye(3) - along)
-    return ca.sparsify(along + ca.cos(angle) * across + ca.sin(angle) * ca.sparsify(cross(a)))
+    return along, ca.sparsify(ca.SX.eye(3) - along), ca.sparsify(cross(a))
 
 
 def of_ball(q: ca.SX) -> ca.SX:

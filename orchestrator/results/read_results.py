@@ -10,7 +10,7 @@ from functools import cached_property, lru_cache
 from itertools import chain
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -164,6 +164,8 @@ class Results:
     folder: Path | None
     run: dict[str, Any]
     tables: Mapping[str, Table]
+    known_scene: ClassVar[Any] = None
+    """The Scene, of which run.json has the tables, where this process has just run it."""
 
     @property
     def last_time(self) -> float:
@@ -202,9 +204,12 @@ def _are_equal(mine: Table, its: Table) -> bool:
     return all(np.array_equal(a, b, equal_nan=a.dtype == float) for a, b in pairs)
 
 
-def with_record(results: Results, record: RunRecord) -> Results:
-    """Results whose `record` is known without reading it from `run`."""
-    vars(results)["record"] = record
+R = TypeVar("R", bound=Results)
+
+
+def with_record(results: R, record: RunRecord, scene: object = None) -> R:
+    """Results whose `record`, and perhaps `known_scene`, are known without reading `run`."""
+    vars(results).update(record=record, known_scene=scene)
     return results
 
 
@@ -240,8 +245,7 @@ def load(folder: Path | str, from_rows: bool = False, record: RunRecord | None =
     folder = Path(folder)
     run = run_json(folder)
     record = record or run_record.read_record(run, folder)
-    tables = FolderTables(folder, record, from_rows)
-    return with_record(Results(folder, run, dict(tables)), record)
+    return with_record(Results(folder, run, {**FolderTables(folder, record, from_rows)}), record)
 
 
 def read_into_memory(results: Results) -> Results:
@@ -250,7 +254,7 @@ def read_into_memory(results: Results) -> Results:
         name: replace(table, rows=table.rows.read()) if isinstance(table.rows, RowsFile) else table
         for name, table in results.tables.items()
     }
-    return with_record(replace(results, tables=tables), results.record)
+    return with_record(replace(results, tables=tables), results.record, results.known_scene)
 
 
 def without_rows(results: Results) -> Mapping[str, Table]:

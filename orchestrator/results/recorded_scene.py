@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from functools import cache
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from hapticlink.components.specs.device import Device
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.signal_names import DEVICE, block_of_user, by_user
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.results.read_results import Results
 from hapticlink.orchestrator.results.run_record import first_error
 from hapticlink.orchestrator.scene.overrides import toml
@@ -19,9 +19,11 @@ from hapticlink.orchestrator.scene.overrides import toml
 def scene_part(results: Results, name: str, kind: Any) -> Any:
     """The table `name` of a run's scene as a record of `kind`, None where the scene has none.
     Raises InputFault where it is not as this version writes it."""
+    if (known := results.known_scene) is not None:
+        return getattr(known, name)
     try:
         given = results.record.scene[name]
-        return None if given is None else _adapter(kind).validate_python(given)
+        return None if given is None else adapter(kind).validate_python(given)
     except KeyError:
         why = "is missing"
     except ValidationError as error:
@@ -44,11 +46,6 @@ def described_devices(results: Results) -> dict[str, Device]:
         for user, device in all_devices(results).items()
         if device.observer.beside or block_of_user(DEVICE, user) not in replaced
     }
-
-
-@cache  # which takes longer to make than most figures take to draw
-def _adapter(kind: Any) -> TypeAdapter[Any]:
-    return TypeAdapter(kind)
 
 
 def scene_file(run: Results) -> str:

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import ValidationError
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.plain_data import plain
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
 from hapticlink.orchestrator.plan.sample_ages import Delay
 from hapticlink.orchestrator.scene.scene_tables import Latency
@@ -351,7 +351,7 @@ def read_record(run: Mapping[str, Any], folder: Path | None) -> RunRecord:
     """The content of a run.json as a record. Raises InputFault where it is of another version, or
     was changed."""
     try:
-        record: RunRecord = _adapter().validate_python(run)
+        record: RunRecord = adapter(RunRecord).validate_python(run)
     except ValidationError as error:
         why = first_error(error)
     else:
@@ -359,11 +359,6 @@ def read_record(run: Mapping[str, Any], folder: Path | None) -> RunRecord:
             return record
         why = "scene.title: input should be a valid string"
     raise InputFault(f"{folder}/run.json: {why}: run the scene again")
-
-
-@cache
-def _adapter() -> TypeAdapter[RunRecord]:
-    return TypeAdapter(RunRecord)
 
 
 def first_error(error: ValidationError) -> str:

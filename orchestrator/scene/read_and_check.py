@@ -16,6 +16,7 @@ from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, SceneFault
 from hapticlink.orchestrator.base.plain_data import plain
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.scene import (
     checks,
     device_files,
@@ -36,7 +37,7 @@ from hapticlink.orchestrator.scene.refused_keys_and_values import (
     find_further_problems,
     find_unrepresentable,
 )
-from hapticlink.orchestrator.scene.scene import Scene, WrittenScene, adapter
+from hapticlink.orchestrator.scene.scene import Scene, WrittenScene
 from hapticlink.orchestrator.scene.scene_source import Source
 from hapticlink.orchestrator.scene.signal_sources import read_log, with_signals
 from hapticlink.orchestrator.scene.toml_keys import (
@@ -69,12 +70,12 @@ def _read_tables(data: dict[str, Any]) -> Scene:
             with suppress(pydantic.ValidationError):  # which reading the whole tells
                 shared[key] = _read_table(key, _write(alone | {key: data[key]}))
     rest = {key: table for key, table in data.items() if key not in shared}
-    return replace(adapter().validate_json(_write(rest)), **shared)
+    return replace(adapter(Scene).validate_json(_write(rest)), **shared)
 
 
 @lru_cache(32)
 def _read_table(key: str, text: bytes) -> Any:
-    return getattr(adapter().validate_json(text), key)
+    return getattr(adapter(Scene).validate_json(text), key)
 
 
 def _write(data: dict[str, Any]) -> bytes:

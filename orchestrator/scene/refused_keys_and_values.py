@@ -13,8 +13,9 @@ import pydantic
 from pydantic_core import to_json
 
 from hapticlink.orchestrator.base.errors import COUNTED, near, shorten, unknown
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.scene import checks, key_descriptions, types_of_keys
-from hapticlink.orchestrator.scene.scene import adapter
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import DEEPEST, Path, Problem, value
 
 
@@ -91,7 +92,7 @@ def find_further_problems(known: Sequence[tuple[Path, str]], data: Any) -> list[
             node[path[-1]] = filled
     try:
         document = to_json(whole, inf_nan_mode="constants")
-        faults = checks.check_scene(adapter().validate_json(document))
+        faults = checks.check_scene(adapter(Scene).validate_json(document))
     except pydantic.ValidationError:
         return []
     return [problem for problem in faults if problem[0] not in reported]

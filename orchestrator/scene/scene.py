@@ -13,10 +13,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from functools import cache
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Discriminator, Tag, TypeAdapter
+from pydantic import ConfigDict, Discriminator, Tag
 
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.ports import Kind
@@ -313,10 +312,3 @@ class WrittenScene(Scene):
     @property
     def source(self) -> Source | None:
         return self.read_from if self.plain() == self.written else None
-
-
-@cache
-def adapter() -> TypeAdapter[Scene]:
-    """The pydantic reader of scenes. It is cached since building it takes ten times as long as
-    reading a scene."""
-    return TypeAdapter(Scene)

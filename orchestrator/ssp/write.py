@@ -16,18 +16,17 @@ from pathlib import Path
 from typing import Any
 from xml.etree.ElementTree import Element, SubElement, indent, register_namespace, tostring
 
-import pydantic
-
 from hapticlink.components.ports import BASES
 from hapticlink.fmus.atomic_file import atomic_file
 from hapticlink.fmus.reproducible_zip import write_zip
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.orchestrator.fmi.description import INTERFACES
 from hapticlink.orchestrator.fmi.variables import Scalar
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import AnyRate
-from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene import Graphics, Scene
 from hapticlink.orchestrator.scene.scene_tables import Wire
 from hapticlink.orchestrator.ssp import step_sizes
 from hapticlink.orchestrator.ssp.names import (
@@ -192,18 +191,17 @@ def _units(root: Element, system: System) -> None:
 def _rest(scene: Scene, system: System) -> dict[str, Any]:
     """The content of the annotation, with the keys of a scene."""
     keys = {f.name for f in fields(Scene)} - NOT_IN_ANNOTATION
-    tables = pydantic.TypeAdapter(Scene).dump_python(
+    tables = adapter(Scene).dump_python(
         scene, mode="json", by_alias=True, exclude_none=True, include=keys
     )
     tables["stop_when"] = scene.ends_when if system.ends_when else ""
     tables["holds"] = scene.named_holds
     rates = blocks(scene).rates
     if scene.graphics and "graphics" in rates.values():
-        graphics = pydantic.TypeAdapter(type(scene.graphics))
-        tables["graphics"] = graphics.dump_python(
+        tables["graphics"] = adapter(Graphics).dump_python(
             scene.graphics, mode="json", exclude_none=True, include={*OF_GRAPHICS}
         )
-    as_json = partial(pydantic.TypeAdapter(AnyRate).dump_python, mode="json")
+    as_json = partial(adapter(AnyRate).dump_python, mode="json")
     derivatives = {f.name: dict(f.derivatives) for f in scene.fmu if f.derivatives}
     tolerances = {f.name: f.tolerance for f in scene.fmu if f.tolerance is not None}
     tables["fmu"] = {

@@ -15,7 +15,11 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.tracking import Tracking
+from hapticlink.components.specs.contacts import Contacts
+from hapticlink.components.specs.device import Device
+from hapticlink.components.specs.linkage import Directions, Linkage, Mechanism
 from hapticlink.fmus.versions import install_command
+from hapticlink.orchestrator.results.recorded_scene import scene_part
 from hapticlink.visualization.figures import run_figures
 from tests.shared_fixtures import sets, status
 
@@ -55,6 +59,18 @@ def test_a_run_is_the_same_in_memory_in_a_folder_and_by_the_command(
         assert folder.run[key] == command.run[key]
     assert set(folder.run["files"]) == {p.name for p in (tmp_path / "api").iterdir()}
     assert folder.run["options"] == ["duration=0.1", "graphics.rate=40"]
+
+
+def test_what_is_known_of_a_run_is_what_is_read_from_its_folder(tmp_path: Path) -> None:
+    """Its record and the parts of its scene, of which summary and figures are made."""
+    ran = hl.run("enclosure", SHORT, out=tmp_path, figures=False)
+    read = hl.load(tmp_path)
+    assert ran.known_scene
+    assert not read.known_scene
+    assert ran.record == read.record
+    parts = {"linkage": Linkage, "mechanism": Mechanism, "directions": Directions}
+    for name, kind in (parts | {"device": Device, "contacts": Contacts}).items():
+        assert scene_part(ran, name, kind) == scene_part(read, name, kind)
 
 
 @pytest.mark.parametrize("scene", ["bar", "closed-loop-ideal"])

@@ -115,6 +115,8 @@ EQUATIONS = ("hapticlink.components.component", "hapticlink.fmus.python_fmu_entr
     ("line", "left"),
     [
         (("--help",), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
+        (("run", "--help"), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
+        (("view", "--help"), (*EQUATIONS, "casadi", "numpy", "pydantic", "fmpy", "matplotlib")),
         (("run", "{bar}", "--no-figures"), (*EQUATIONS, "matplotlib")),
         (("run", "{bar}"), ("scipy",)),
         (("info", "{bar}"), ("scipy", "matplotlib")),

@@ -90,7 +90,7 @@ def drawings(results: Results) -> dict[str, Callable[[], Figure]]:
         return drawn_by
     with_rows = {name: table for name, table in results.tables.items() if len(table.rows)}
     whole_run = Results(results.folder, results.run, with_rows)
-    results = with_record(whole_run, results.record)
+    results = with_record(whole_run, results.record, results.known_scene)
     whole, forced, touched = user_port(results), any(wrenches(results)), touching(results)
     counted = count_constrained(results)
     # an SSP has the block, but not its description

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Annotated, Literal
+from typing import Annotated, Literal, cast
 
-from pydantic import ConfigDict, Discriminator, Field, TypeAdapter, ValidationError
+from pydantic import ConfigDict, Discriminator, Field, ValidationError
 
+from hapticlink.orchestrator.base.type_adapters import adapter
 from hapticlink.visualization.live_and_standalone.offered_controls import (
     MODEL,
     RANGES,
@@ -87,13 +87,7 @@ class TrialReply:
     given: Name
 
 
-Message = Hand | SetControl | Time | Compare | TrialReply
-
-
-@cache
-def _adapter() -> TypeAdapter[Message]:
-    """Made with the first message, which no page sends before it has shown a picture."""
-    return TypeAdapter(Annotated[Message, Discriminator("type")])
+Message = Annotated[Hand | SetControl | Time | Compare | TrialReply, Discriminator("type")]
 
 
 def newest(received: Sequence[Message]) -> list[Message]:
@@ -114,7 +108,7 @@ def parse(text: str | bytes) -> Message:
     if len(text) > MAX_CHARACTERS:
         raise ValueError(f"a message has at most {MAX_CHARACTERS} characters")
     try:
-        return _adapter().validate_json(text)
+        return cast(Message, adapter(Message).validate_json(text))
     except ValidationError as error:
         first = error.errors(include_url=False, include_input=False)[0]
         place = ".".join(map(str, first["loc"]))
