@@ -30,13 +30,13 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7492,
+    "components": 7499,
     "fmus": 2991,
-    "orchestrator": 16843,
+    "orchestrator": 16836,
     "programs": 1027,
     "analysis": 9111,
-    "visualization": 3848,
-    "api": 637,
+    "visualization": 3845,
+    "api": 640,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
