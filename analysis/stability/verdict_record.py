@@ -8,6 +8,8 @@ from dataclasses import asdict, dataclass
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from hapticlink.analysis.search.search import DOUBLINGS
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import Case, worst_case
@@ -20,6 +22,9 @@ from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
+
+SAME = 0.01
+"""Difference of the wrench in an equilibrium from the scene's, relative, that is not told."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -93,6 +98,7 @@ class Stability:
             "damping_needed_in_free_air": self.damping,
             "drift": asdict(self.bounds),
             "poses": [asdict(pose) for pose in self.poses],
+            "equilibria": {c.pose: asdict(c.at) for c in self.cases if c.at},
             "poses_without_equilibrium": dict(self.without),
             "hands": {name: asdict(hand) if hand else None for name, hand in self.hands.items()},
             "cases": [case.record() for case in self.cases],
@@ -184,6 +190,7 @@ class Stability:
                 f"at {', '.join(full)} motors are at their limit, and are judged as if they stayed "
                 "there: the hand moves the bare device, until it takes them off their limit"
             )
+        yield from self._about_rest()
         if self.margin.alone:
             yield (
                 f"at {self.worst.pose} the mechanism leaves its pose by itself: without hand and "
@@ -214,6 +221,28 @@ class Stability:
         apart = frozen_nonlinearities.name_by_end(self.frozen)
         if apart:
             yield f"judged for small motions; {apart}"
+
+    def _about_rest(self) -> Iterator[str]:
+        """Of which equilibria the rates are."""
+        held = [case for case in self.cases if case.at and not case.free]
+        for pose in self.poses:
+            at = next((case.at for case in held if case.pose == pose.name), None)
+            if not pose.found or at is None:
+                continue
+            apart = np.abs(np.subtract(at.press, pose.press)).max() > SAME * max(
+                map(abs, pose.press)
+            )
+            F = ", ".join(f"{x:.3g}" for x in at.press)
+            yield f"{pose.name}: {pose.found}{f', with ({F}) N and N.m' if apart else ''}"
+            break
+        beside = dict.fromkeys(
+            c.pose for c in held if min(o.neutral for o in held if o.pose == c.pose)
+        )
+        if beside:
+            yield (
+                f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "
+                "resists: the rates are of those in stability.json, and may differ beside them"
+            )
 
     def _margins(self) -> Iterator[str]:
         margin = self.margin
