@@ -97,7 +97,8 @@ class Pose:
     def at_equilibrium(self, found: RestingScene, linkage: Linkage) -> Pose:
         """The pose in which a scene was found to rest next to this one."""
         q = found.signal(JOINT_COORDINATES)
-        x, handle, F = map(tuple, map(found.signal, (POINT_POSE, HANDLE_POSE, HAND_WRENCH)))
+        ports = POINT_POSE, HANDLE_POSE, HAND_WRENCH
+        x, handle, F = (tuple(found.signal(port).tolist()) for port in ports)
         joints = by_joint(linkage, q) if len(q) else self.joints
         return replace(self, joints=joints, point=x, handle=handle or None, press=F)
 
