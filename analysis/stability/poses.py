@@ -22,7 +22,7 @@ from hapticlink.analysis.stability.hands import (
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
-from hapticlink.analysis.stability.smooth_scene import Place
+from hapticlink.analysis.stability.smooth_scene import StartPose
 from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
@@ -91,8 +91,9 @@ class Pose:
     """How, of a pose that is no moment."""
 
     @property
-    def place(self) -> Place:
-        return Place(self.joints, self.handle)
+    def start(self) -> StartPose:
+        """Where a map begins."""
+        return StartPose(self.joints, self.handle)
 
     def at_equilibrium(self, found: RestingScene, linkage: Linkage) -> Pose:
         """The pose in which a scene was found to rest next to this one."""
@@ -124,8 +125,7 @@ class Pose:
             return True
         off = by_direction(self.space, OFF, PER_METRE)
         held = {"hand": standing(hand, np.add(self.point, (off[0], 0.0, off[2])))}
-        changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
-        run = simulate_scene(read, changes)
+        run = simulate_for(LEAVING, read, {**self.started, **held})
         moved = np.abs(_read_poses(run)[POINT_POSE] - self.point).max(axis=0)
         near = by_direction(self.space, NEAR, PER_METRE)
         return bool(run.record.fault) or bool((moved > near).any())
@@ -153,6 +153,11 @@ def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
         return read_into_memory(experiment.results)
+
+
+def simulate_for(seconds: float, scene: Scene, changes: Mapping[str, object] = {}) -> Results:
+    """A run of that length, whatever ends the scene early."""
+    return simulate_scene(scene, {**changes, "duration": seconds, "stop_when": ""})
 
 
 def fault_of(run: Results) -> str:
@@ -183,17 +188,14 @@ def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
     options = {"type": "constant", "wrench": read.hand.wrench, "damping": damping}
     told = f"its run{'' if own else f' with {SETTLED_BY:g} N.s/m of damping'}"
 
-    def settled(seconds: float) -> Results:
-        return simulate_scene(read, {"hand": options, "duration": seconds, "stop_when": ""})
-
-    run = settled(SETTLING)
+    run = simulate_for(SETTLING, read, {"hand": options})
     if run.record.fault:
         raise InputFault(f"{told} fails: {run.record.fault.message}")
     speed = float(np.abs(_late_rates(run)).max())
     if speed <= NEARLY:
         with suppress(InputFault, FmuFault):
-            pose = _rested(settled(LONGEST), linkage)
-            with resting(read, {"hand": options}, at=pose.place) as place:
+            pose = _rested(simulate_for(LONGEST, read, {"hand": options}), linkage)
+            with resting(read, {"hand": options}, at=pose.start) as place:
                 pose = pose.at_equilibrium(place, linkage)
             return [replace(pose, title=LED, found=f"{told} rests there")]
     found = (
@@ -208,8 +210,7 @@ def rest(read: Scene, linkage: Linkage) -> Pose:
     """Where the run of a scene comes to rest within LONGEST, with what its hand presses there.
     Raises InputFault where it fails, or keeps moving."""
     hyperperiod(timeline(read))  # refuses rates without one
-    run = simulate_scene(read, {"duration": LONGEST, "stop_when": ""})
-    return replace(_rested(run, linkage), title="where its run rests")
+    return replace(_rested(simulate_for(LONGEST, read), linkage), title="where its run rests")
 
 
 def _rested(run: Results, linkage: Linkage) -> Pose:
@@ -226,8 +227,8 @@ def _rested(run: Results, linkage: Linkage) -> Pose:
             f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
             "that holds it"
         )
-    ends = ((table_of(run, port) or {}).get(port) for port in (HANDLE_POSE, HAND_WRENCH))
-    handle, press = (None if each is None else tuple(each[-1].tolist()) for each in ends)
+    tables = ((table_of(run, port), port) for port in (HANDLE_POSE, HAND_WRENCH))
+    handle, press = (tuple(at[port][-1].tolist()) if at else None for at, port in tables)
     end = _average(run, linkage, 1.0)
     return replace(end, handle=handle, press=press or (0.0, 0.0, 0.0))
 
@@ -248,7 +249,7 @@ def in_own_hand(read: Scene) -> Iterator[tuple[RestingScene, Hand | None]]:
     with ExitStack() as stack:
         found, last = None, Fault()
         for pose, hand in _own_equilibria(read):
-            at = (pose.held, None, pose.place) if pose else ()
+            at = (pose.held, None, pose.start) if pose else ()
             try:
                 found = stack.enter_context(resting(read, *at)), hand
                 break
@@ -347,13 +348,13 @@ def at_pose(
     with ExitStack() as stack:
         try:
             options = pose.held if held else {}
-            place = stack.enter_context(resting(read, options, start, pose.place, work))
+            place = stack.enter_context(resting(read, options, start, pose.start, work))
             _require_touch(pose, place)
         except (InputFault, FmuFault):
             if not pose.touches:
                 raise
             pose = pose.lighter
-            place = stack.enter_context(resting(read, pose.held, start, pose.place, work))
+            place = stack.enter_context(resting(read, pose.held, start, pose.start, work))
         yield place, pose
 
 

@@ -30,7 +30,7 @@ Joints = Mapping[str, float | list[float]]
 """Joint coordinates (m, rad) as `linkage.start` has them."""
 
 
-class Place(NamedTuple):
+class StartPose(NamedTuple):
     """Where a linkage is, and the pose of the handle: None on the operational point."""
 
     joints: Joints
@@ -49,7 +49,7 @@ that on `enclosure`, with 6,144, takes 11 s with either."""
 
 @contextmanager
 def linearisable(
-    scene: str | Path | Scene, options: Options = (), at: Place | None = None
+    scene: str | Path | Scene, options: Options = (), at: StartPose | None = None
 ) -> Iterator[tuple[Scene, System, list[str]]]:
     """The scene with `options`, its system without quantisation, friction and passivity
     controllers, and a line of text on each that was removed; with `at`, at rest there.
@@ -77,7 +77,7 @@ def with_quicker_fmus(read: Scene) -> Scene:
     return open_scene.load(read, {"packaging": "native"})
 
 
-def at_rest(system: System, linkage: Linkage, at: Place) -> System:
+def at_rest(system: System, linkage: Linkage, at: StartPose) -> System:
     """The system whose linkage starts at rest in a place, with the same FMU files in all of
     them: the start is a parameter of the mechanism, of its copy and of the device."""
     q = coordinates(linkage, at.joints)

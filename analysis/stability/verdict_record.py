@@ -8,8 +8,6 @@ from dataclasses import asdict, dataclass
 from html import escape
 from typing import Any
 
-import numpy as np
-
 from hapticlink.analysis.search.search import DOUBLINGS
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.hand_cases import Case, worst_case
@@ -22,9 +20,6 @@ from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator.results.html_table import html_table
 from hapticlink.orchestrator.scene.overrides import as_command_line
-
-SAME = 0.01
-"""Difference of the wrench in an equilibrium from the scene's, relative, that is not told."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -224,21 +219,12 @@ class Stability:
 
     def _about_rest(self) -> Iterator[str]:
         """Of which equilibria the rates are."""
-        held = [case for case in self.cases if case.at and not case.free]
-        for pose in self.poses:
-            at = next((case.at for case in held if case.pose == pose.name), None)
-            if not pose.found or at is None:
-                continue
-            apart = np.abs(np.subtract(at.press, pose.press)).max() > SAME * max(
-                map(abs, pose.press)
-            )
-            F = ", ".join(f"{x:.3g}" for x in at.press)
-            yield f"{pose.name}: {pose.found}{f', with ({F}) N and N.m' if apart else ''}"
-            break
-        beside = dict.fromkeys(
-            c.pose for c in held if min(o.neutral for o in held if o.pose == c.pose)
-        )
-        if beside:
+        held = {case.pose: case for case in self.cases if case.at and not case.free}
+        for name, case in held.items():
+            if case.at and case.at.found:
+                F = ", ".join(f"{x:.3g}" for x in case.at.press)
+                yield f"{name}: {case.at.found}, with ({F}) N and N.m"
+        if beside := [name for name, case in held.items() if case.neutral]:
             yield (
                 f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "
                 "resists: the rates are of those in stability.json, and may differ beside them"

@@ -40,8 +40,7 @@ def _draw(rng: np.random.Generator) -> tuple[str, dict[str, Any]]:
     soft = 0.3 if direct else 1.0
     stiff = round(100.0 * soft * spread(2.5) * (0.3 if light else 1.0), 2)
     turn = round(0.5 * soft * spread(2.5), 4)
-    damp = [round(stiff * d, 3) for d in (0.1, 0.4)]
-    b = round(float(rng.uniform(*damp)), 3)
+    b = round(float(rng.uniform(round(stiff * 0.1, 3), round(stiff * 0.4, 3))), 3)
     options: dict[str, Any] = {
         "haptics.rate": rate,
         "graphics.rate": f"{rate}/{rng.integers(4, 32)}" if whole else int(rng.integers(12, 70)),
@@ -97,7 +96,10 @@ def _linkage(rng: np.random.Generator, spread: Any) -> dict[str, Any]:
             {"name": n, "mass": w, "inertia": round(2e-4 * w, 7), "center": [length / 2, 0.0]}
             for n, w, length in zip(names, m, a, strict=False)
         ]
-        angles = [round(float(x), 3) for x in rng.uniform([0.4, -1.9, 0.5], [1.2, -1.1, 1.2])]
+        angles = [
+            round(float(x), 3)
+            for x in np.array([0.4, -1.9, 0.5]) + np.array([0.8, 0.8, 0.7]) * rng.uniform(size=3)
+        ]
         joints = [
             {"name": f"joint{i}", "child": n, "damping": round(0.002 * spread(3.0), 5)}
             | ({"parent": names[i - 1], "at_parent": [a[i - 1], 0.0]} if i else {})
