@@ -178,21 +178,21 @@ def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pos
 
 
 def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
-    """Where the constant wrench of a scene leads a handle with the scene's own damping, or else
-    SETTLED_BY: the equilibrium in which that run rests, the one of all that may lie side by side.
-    Where it keeps moving, the end of the run, and about its mean if there is no equilibrium nearby.
-    Raises InputFault where the run fails."""
+    """Where the constant wrench of a scene leads a damped handle: at the end of a run, and about
+    its mean if there is no equilibrium nearby. Without topology controller equilibria lie side by
+    side: then the one in which the run rests, if it does, with the scene's own damping if there is
+    any. Raises InputFault where the run fails."""
     assert isinstance(read.hand, ConstantHand)
-    own = any(read.hand.damping or ())
+    single = bool(read.controller and read.controller.topology)
+    own = any(read.hand.damping or ()) and not single
     damping = read.hand.damping if own else by_direction(linkage.space, SETTLED_BY, TURNING)
     options = {"type": "constant", "wrench": read.hand.wrench, "damping": damping}
     told = f"its run{'' if own else f' with {SETTLED_BY:g} N.s/m of damping'}"
-
     run = simulate_for(SETTLING, read, {"hand": options})
     if run.record.fault:
         raise InputFault(f"{told} fails: {run.record.fault.message}")
     speed = float(np.abs(_late_rates(run)).max())
-    if speed <= NEARLY:
+    if speed <= NEARLY and not single:
         with suppress(InputFault, FmuFault):
             pose = _rested(simulate_for(LONGEST, read, {"hand": options}), linkage)
             with resting(read, {"hand": options}, at=pose.start) as place:
