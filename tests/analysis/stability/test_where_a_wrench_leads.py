@@ -89,7 +89,9 @@ def test_a_run_that_keeps_moving_is_told_with_the_wrench_at_the_equilibrium_besi
     F = next(case.at.press for case in found.cases if case.pose == found.poses[-1].name and case.at)
     assert told.endswith(f"with ({F[0]:.3g}, {F[1]:.3g}, {F[2]:.3g}) N and N.m")
     assert abs(F[0] + 0.5) > 0.005
-    run = hl.run("closed-loop-ideal", {"duration": 10.0, "hand.damping": [5.0, 5.0, 0.005]})
+    run = hl.run(
+        "closed-loop-ideal", {"duration": 10.0, "hand.damping": [5.0, 5.0, 0.005]}, figures=False
+    )
     rates = run["virtual_mechanism.qd"][-512:]
     assert np.abs(rates).max() == pytest.approx(3.2, abs=0.05)
 
