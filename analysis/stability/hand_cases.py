@@ -71,8 +71,12 @@ class Case:
     damping: float | None = None
     """Of a free handle that grows: the damping to ground (N.s/m) that ends it; infinite where none
     of DAMPINGS does."""
+    neutral: int = 0
+    """In how many directions nothing resists, so that equilibria lie side by side."""
     saturated: bool = False
     """Whether motors are at their limit there."""
+    at: Pose | None = None
+    """The equilibrium."""
 
     @property
     def free(self) -> bool:
@@ -102,6 +106,7 @@ class Case:
             "verdict": self.verdict,
             "participation": dict(self.participation),
             "damping_needed": self.damping,
+            "neutral": self.neutral,
             "saturated": self.saturated,
         }
 
@@ -165,7 +170,7 @@ class InHands:
         in that hand."""
         largest = -np.inf
         for hand in hands.values():
-            mode, period = self._leading(hand)
+            mode, period, _ = self._leading(hand)
             growth = mode.growth
             unstable = self._verdict(mode) == "unstable"
             if unstable or (growth > SLIGHT and growth > TWICE * slow(hand)):
@@ -178,7 +183,7 @@ class InHands:
 
     def slow(self, hand: Hand | None) -> float:
         """The growth rate (1/s) in a hand in which it is marginal, else 0."""
-        mode, _ = self._leading(hand)
+        mode, _, _ = self._leading(hand)
         return mode.growth if self._verdict(mode) == "marginal" else 0.0
 
     def cases(self, pose: str, hands: Mapping[str, Hand | None], bounds: Bounds) -> list[Case]:
@@ -186,25 +191,29 @@ class InHands:
         return [self._case(pose, name, hand, bounds) for name, hand in hands.items()]
 
     def _case(self, pose: str, name: str, hand: Hand | None, bounds: Bounds) -> Case:
-        mode, period = self._leading(hand)
+        mode, period, neutral = self._leading(hand)
         said = self._verdict(mode)
         mode = period.traced(mode)
         hertz = mode.omega / (2 * np.pi)
         uncertainty = float(min(mode.uncertainty, 1.0)) / self._seconds
         moving = tuple(leading(mode, period.names(), SHARES))
         grows = kind(mode.growth, hertz, bounds)
-        case = Case(pose, name, mode.growth, uncertainty, hertz, grows, said, moving)
+        case = Case(
+            pose, name, mode.growth, uncertainty, hertz, grows, said, moving, neutral=neutral
+        )
         if case.free and said == "unstable":
             return replace(case, damping=self._damping())
         return case
 
-    def _leading(self, hand: Hand | None) -> tuple[Mode, LinearPeriod]:
+    def _leading(self, hand: Hand | None) -> tuple[Mode, LinearPeriod, int]:
+        """The mode by which a hand is judged, of which period, and how many are neutral."""
         period = self._period
         if hand is not None:
             period = period.held(
                 dict.fromkeys(self._users, hand_slopes(hand, self._T, self._space))
             )
-        return judged_modes(modes(period.linear, self._seconds))[0], period
+        found = modes(period.linear, self._seconds)
+        return judged_modes(found)[0], period, sum(mode.neutral for mode in found)
 
     def _verdict(self, mode: Mode) -> str:
         slight = np.expm1(SLIGHT * self._seconds)
@@ -234,7 +243,7 @@ def in_poses(
             continue
         begin(pose.name)
         try:
-            with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, _):
+            with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
                 # A constant wrench slides off what it presses on, whatever the loop does.
                 lasting = {
                     name: hand
@@ -243,7 +252,9 @@ def in_poses(
                 }
                 there = InHands(place).cases(pose.name, lasting, bounds)
                 saturated = is_saturated(read, place)
-                cases += [replace(case, saturated=saturated) for case in there]
+                assert read.linkage is not None
+                at = pressed.at_equilibrium(place, read.linkage)
+                cases += [replace(case, saturated=saturated, at=at) for case in there]
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
         else:

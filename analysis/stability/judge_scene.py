@@ -39,7 +39,7 @@ from hapticlink.analysis.stability.poses import (
     is_hand_replaced,
     presses,
     rest,
-    simulate_scene,
+    simulate_for,
 )
 from hapticlink.analysis.stability.remedy_trial import Visited
 from hapticlink.analysis.stability.shared_work import SharedWork
@@ -165,14 +165,10 @@ def hands_of(hand: Hand, space: PortSpace = PLANE) -> dict[str, Hand]:
     return {**family, (OWN_FREE if damped else FREE): linearise_hand(hand)}
 
 
-def _simulate_span(read: Scene) -> Results:
-    return simulate_scene(read, {"duration": SPAN, "stop_when": ""})
-
-
 def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Results]:
     """The poses that a scene's own run visits, and that run."""
     assert read.linkage is not None
-    run = _simulate_span(read)
+    run = simulate_for(SPAN, read)
     poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
@@ -191,7 +187,7 @@ def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> St
     steps = Steps(progress, 1)
     steps.begin("the run until it rests")
     try:
-        work = SharedWork(run=lambda: _simulate_span(read))
+        work = SharedWork(run=lambda: simulate_for(SPAN, read))
         return _judge(read, _at_rest, hands, bounds, steps, rounded, work)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:

@@ -4,7 +4,7 @@ with the median force of all that are; where its run comes to rest; and where a 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from hapticlink.analysis.stability.hands import (
 from hapticlink.analysis.stability.lifted_map import hyperperiod
 from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
-from hapticlink.analysis.stability.smooth_scene import Joints
+from hapticlink.analysis.stability.smooth_scene import StartPose
 from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
@@ -35,6 +35,7 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND,
     HAND_WRENCH,
+    HANDLE_POSE,
     JOINT_COORDINATES,
     JOINT_RATES,
     POINT_POSE,
@@ -53,8 +54,10 @@ SETTLED_BY = 5.0
 """Damping of the handle meanwhile (N.s/m)."""
 LONGEST, LATE = 60.0, 0.1
 """Time (s) after which a run that has not come to rest does not, and its last part."""
-AT_REST = 1e-3
-"""Rate (rad/s, m/s) of the fastest joint in that part, up to which a run rests."""
+AT_REST, NEARLY = 1e-3, 1.0
+"""Rates (rad/s, m/s) of the fastest joint in that part, up to which a run rests, and up to which a
+shorter one may."""
+LED = "where its wrench leads"
 LEAVING, OFF = 20.0, 2e-4
 """Duration (s) of a run that shows where a divergence leads, and how far off the hand is at first
 (m), along x and along z or about it."""
@@ -82,6 +85,23 @@ class Pose:
     """What it is, instead of a moment."""
     space: PortSpace = PLANE
     """Of the operational point."""
+    handle: tuple[float, ...] | None = None
+    """The pose of the handle, where that is not on the operational point."""
+    found: str = ""
+    """How, of a pose that is no moment."""
+
+    @property
+    def start(self) -> StartPose:
+        """Where a map begins."""
+        return StartPose(self.joints, self.handle)
+
+    def at_equilibrium(self, found: RestingScene, linkage: Linkage) -> Pose:
+        """The pose in which a scene was found to rest next to this one."""
+        q = found.signal(JOINT_COORDINATES)
+        ports = POINT_POSE, HANDLE_POSE, HAND_WRENCH
+        x, handle, F = (tuple(found.signal(port).tolist()) for port in ports)
+        joints = by_joint(linkage, q) if len(q) else self.joints
+        return replace(self, joints=joints, point=x, handle=handle or None, press=F)
 
     @property
     def touches(self) -> bool:
@@ -105,8 +125,7 @@ class Pose:
             return True
         off = by_direction(self.space, OFF, PER_METRE)
         held = {"hand": standing(hand, np.add(self.point, (off[0], 0.0, off[2])))}
-        changes = {**self.started, **held, "duration": LEAVING, "stop_when": ""}
-        run = simulate_scene(read, changes)
+        run = simulate_for(LEAVING, read, {**self.started, **held})
         moved = np.abs(_read_poses(run)[POINT_POSE] - self.point).max(axis=0)
         near = by_direction(self.space, NEAR, PER_METRE)
         return bool(run.record.fault) or bool((moved > near).any())
@@ -123,7 +142,8 @@ class Pose:
         hands = {
             f"hands.{u}": spring(x, no_force, FIRM, self.space) for u, x in self.others.items()
         }
-        return {"hand": spring(self.point, self.press, FIRM, self.space), **hands}
+        at = self.handle or self.point
+        return {"hand": spring(at, self.press, FIRM, self.space), **hands}
 
 
 def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
@@ -133,6 +153,11 @@ def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
         if not experiment.outcome.published:
             raise InputFault(f"the scene's own run fails: {experiment.outcome.fault}")
         return read_into_memory(experiment.results)
+
+
+def simulate_for(seconds: float, scene: Scene, changes: Mapping[str, object] = {}) -> Results:
+    """A run of that length, whatever ends the scene early."""
+    return simulate_scene(scene, {**changes, "duration": seconds, "stop_when": ""})
 
 
 def fault_of(run: Results) -> str:
@@ -153,29 +178,46 @@ def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pos
 
 
 def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
-    """Where the constant wrench of a scene would come to rest, if it does, with a damped handle: at
-    the end of a run, and about its mean if there is no equilibrium nearby. Raises InputFault where
-    that fails."""
+    """Where the constant wrench of a scene leads a damped handle: at the end of a run, and about
+    its mean if there is no equilibrium nearby. Without topology controller equilibria lie side by
+    side: then the one in which the run rests, if it does, with the scene's own damping if there is
+    any. Raises InputFault where the run fails."""
     assert isinstance(read.hand, ConstantHand)
-    wrench = read.hand.wrench
-    damping = by_direction(linkage.space, SETTLED_BY, TURNING)
-    damped = {"type": "constant", "wrench": list(wrench), "damping": list(damping)}
-    run = simulate_scene(read, {"hand": damped, "duration": SETTLING, "stop_when": ""})
+    single = bool(read.controller and read.controller.topology)
+    own = any(read.hand.damping or ()) and not single
+    damping = read.hand.damping if own else by_direction(linkage.space, SETTLED_BY, TURNING)
+    options = {"type": "constant", "wrench": read.hand.wrench, "damping": damping}
+    told = f"its run{'' if own else f' with {SETTLED_BY:g} N.s/m of damping'}"
+    run = simulate_for(SETTLING, read, {"hand": options})
     if run.record.fault:
-        raise InputFault(f"its run with a damped handle fails: {run.record.fault.message}")
+        raise InputFault(f"{told} fails: {run.record.fault.message}")
+    speed = float(np.abs(_late_rates(run)).max())
+    if speed <= NEARLY and not single:
+        with suppress(InputFault, FmuFault):
+            pose = _rested(simulate_for(LONGEST, read, {"hand": options}), linkage)
+            with resting(read, {"hand": options}, at=pose.start) as place:
+                pose = pose.at_equilibrium(place, linkage)
+            return [replace(pose, title=LED, found=f"{told} rests there")]
+    found = (
+        f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s, and judged is "
+        "the equilibrium next to there in which a firm grip holds it"
+    )
     near = (_average(run, linkage, since) for since in (1.0, 1.0 - CALM))
-    return [replace(pose, press=wrench, title="where its wrench leads") for pose in near]
+    return [replace(pose, press=read.hand.wrench, title=LED, found=found) for pose in near]
 
 
 def rest(read: Scene, linkage: Linkage) -> Pose:
     """Where the run of a scene comes to rest within LONGEST, with what its hand presses there.
     Raises InputFault where it fails, or keeps moving."""
     hyperperiod(timeline(read))  # refuses rates without one
-    run = simulate_scene(read, {"duration": LONGEST, "stop_when": ""})
+    return replace(_rested(simulate_for(LONGEST, read), linkage), title="where its run rests")
+
+
+def _rested(run: Results, linkage: Linkage) -> Pose:
+    """The pose in which a run of LONGEST rests. Raises InputFault where it does not."""
     if run.record.fault:
         raise InputFault(f"the run does not come to rest: {run.record.fault.message}")
-    table = _read_poses(run)
-    rates = table[JOINT_RATES][int((1.0 - LATE) * len(table["time"])) :]
+    rates = _late_rates(run)
     fastest = np.abs(rates).max(axis=0)
     if (speed := float(fastest.max())) > AT_REST:
         joint = rates[:, int(np.argmax(fastest))]
@@ -185,10 +227,17 @@ def rest(read: Scene, linkage: Linkage) -> Pose:
             f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
             "that holds it"
         )
-    pose = _average(run, linkage, 1.0)
-    with_hand = table_of(run, HAND_WRENCH)
-    press = (0.0, 0.0, 0.0) if with_hand is None else tuple(with_hand[HAND_WRENCH][-1].tolist())
-    return replace(pose, press=press, title="where its run rests")
+    tables = ((table_of(run, port), port) for port in (HANDLE_POSE, HAND_WRENCH))
+    handle, press = (tuple(at[port][-1].tolist()) if at else None for at, port in tables)
+    end = _average(run, linkage, 1.0)
+    return replace(end, handle=handle, press=press or (0.0, 0.0, 0.0))
+
+
+def _late_rates(run: Results) -> Matrix:
+    """The rates of the joints in the last part of a run, (k, n)."""
+    table = _read_poses(run)
+    rates: Matrix = table[JOINT_RATES][int((1.0 - LATE) * len(table["time"])) :]
+    return rates
 
 
 @contextmanager
@@ -199,9 +248,10 @@ def in_own_hand(read: Scene) -> Iterator[tuple[RestingScene, Hand | None]]:
     equilibrium."""
     with ExitStack() as stack:
         found, last = None, Fault()
-        for options, joints, hand in _own_equilibria(read):
+        for pose, hand in _own_equilibria(read):
+            at = (pose.held, None, pose.start) if pose else ()
             try:
-                found = stack.enter_context(resting(read, options, joints=joints)), hand
+                found = stack.enter_context(resting(read, *at)), hand
                 break
             except (InputFault, FmuFault) as fault:
                 last = fault
@@ -210,15 +260,16 @@ def in_own_hand(read: Scene) -> Iterator[tuple[RestingScene, Hand | None]]:
         yield found
 
 
-def _own_equilibria(read: Scene) -> Iterator[tuple[Options, Joints | None, Hand | None]]:
-    """The options of `in_own_hand`, its pose and its hand, in the order in which they are tried."""
+def _own_equilibria(read: Scene) -> Iterator[tuple[Pose | None, Hand | None]]:
+    """The pose of `in_own_hand`, None for its start, and the hand, in the order in which they are
+    tried."""
     if not presses(read):
-        yield (), None, None
+        yield None, None
     if read.linkage is None or read.hand is None or is_hand_replaced(read):
         return
     leads = find_rest_poses if presses(read) else lambda *scene: [rest(*scene)]
     for pose in leads(read, read.linkage):
-        yield pose.held, pose.joints, linearise_hand(read.hand)
+        yield pose, linearise_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
@@ -297,13 +348,13 @@ def at_pose(
     with ExitStack() as stack:
         try:
             options = pose.held if held else {}
-            place = stack.enter_context(resting(read, options, start, pose.joints, work))
+            place = stack.enter_context(resting(read, options, start, pose.start, work))
             _require_touch(pose, place)
         except (InputFault, FmuFault):
             if not pose.touches:
                 raise
             pose = pose.lighter
-            place = stack.enter_context(resting(read, pose.held, start, pose.joints, work))
+            place = stack.enter_context(resting(read, pose.held, start, pose.start, work))
         yield place, pose
 
 

@@ -19,7 +19,7 @@ from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.shared_work import SharedWork
-from hapticlink.analysis.stability.smooth_scene import Joints, linearisable
+from hapticlink.analysis.stability.smooth_scene import StartPose, linearisable
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
@@ -156,14 +156,14 @@ def resting(
     scene: str | Path | Scene,
     options: Options = (),
     start: Vector | None = None,
-    joints: Joints | None = None,
+    at: StartPose | None = None,
     work: SharedWork | None = None,
 ) -> Iterator[RestingScene]:
-    """A scene with `options` at its equilibrium next to its start, to the pose `joints` or to the
+    """A scene with `options` at its equilibrium next to its start, to the place `at` or to the
     state `start`, in the hand that it has; `work` as of `open_lifted_map`. Raises InputFault or
     FmuFault where it has none."""
     with (
-        linearisable(scene, options, joints) as (read, system, _),
+        linearisable(scene, options, at) as (read, system, _),
         resting_system(read, system, start, work) as place,
     ):
         yield place

@@ -93,6 +93,7 @@ class Stability:
             "damping_needed_in_free_air": self.damping,
             "drift": asdict(self.bounds),
             "poses": [asdict(pose) for pose in self.poses],
+            "equilibria": {c.pose: asdict(c.at) for c in self.cases if c.at},
             "poses_without_equilibrium": dict(self.without),
             "hands": {name: asdict(hand) if hand else None for name, hand in self.hands.items()},
             "cases": [case.record() for case in self.cases],
@@ -184,6 +185,7 @@ class Stability:
                 f"at {', '.join(full)} motors are at their limit, and are judged as if they stayed "
                 "there: the hand moves the bare device, until it takes them off their limit"
             )
+        yield from self._about_rest()
         if self.margin.alone:
             yield (
                 f"at {self.worst.pose} the mechanism leaves its pose by itself: without hand and "
@@ -214,6 +216,19 @@ class Stability:
         apart = frozen_nonlinearities.name_by_end(self.frozen)
         if apart:
             yield f"judged for small motions; {apart}"
+
+    def _about_rest(self) -> Iterator[str]:
+        """Of which equilibria the rates are."""
+        held = {case.pose: case for case in self.cases if case.at and not case.free}
+        for name, case in held.items():
+            if case.at and case.at.found:
+                F = ", ".join(f"{x:.3g}" for x in case.at.press)
+                yield f"{name}: {case.at.found}, with ({F}) N and N.m"
+        if beside := [name for name, case in held.items() if case.neutral]:
+            yield (
+                f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "
+                "resists: the rates are of those in stability.json, and may differ beside them"
+            )
 
     def _margins(self) -> Iterator[str]:
         margin = self.margin

@@ -198,7 +198,7 @@ def transparency(
     found, why = [], ""
     for pose in poses:
         try:
-            with resting(whole, pose.held, joints=pose.joints) as place:
+            with resting(whole, pose.held, at=pose.start) as place:
                 found.append(_measure_felt(read, place, pose.name, {}))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
@@ -326,7 +326,7 @@ def costs(
     for name, change in changes.items():
         try:
             whole = whole_frames(open_scene.load(read, change))
-            with resting(whole, pose.held, joints=pose.joints) as place:
+            with resting(whole, pose.held, at=pose.start) as place:
                 found.append(_cost(read, place, name))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")

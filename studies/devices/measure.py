@@ -90,7 +90,7 @@ def judged(name: str) -> Judged:
     read = whole_frames(hl.scene(SCENE, options(name)))
     assert read.linkage is not None
     pose = choose_evenly_spaced(simulate_scene(read), read.linkage, 1)[0]
-    with resting(read, pose.held, joints=pose.joints) as place:
+    with resting(read, pose.held, at=pose.start) as place:
         gains = Gains(place.map.system)
 
         def worst(factor: float) -> Case:

@@ -128,7 +128,7 @@ def test_a_pose_is_that_of_a_scene_that_starts_there_by_the_fmus_of_the_scenes_o
     for pose in choose_evenly_spaced(simulate_scene(scene, ("duration=0.5",)), linkage, 3):
         with resting(scene, pose.started | pose.held) as there:
             start, expected = there.map.start, leading(there.period({}))
-        with resting(scene, pose.held, joints=pose.joints) as moved:
+        with resting(scene, pose.held, at=pose.start) as moved:
             assert moved.map.start == pytest.approx(start, abs=1e-9)
             assert leading(moved.period({})) == pytest.approx(expected, abs=1e-9)
             fmus = moved.map.system.fmus

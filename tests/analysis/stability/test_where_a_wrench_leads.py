@@ -1,0 +1,107 @@
+"""Where the constant wrench of a scene leads, against the scene's own run."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hapticlink as hl
+from hapticlink.analysis.stability.hand_cases import Case, in_poses
+from hapticlink.analysis.stability.hands import OWN_FREE, hands_in, linearise_hand
+from hapticlink.analysis.stability.modes import DRIFT
+from hapticlink.analysis.stability.poses import Pose, find_rest_poses
+
+WRENCH = (-0.3, 0.2, 0.0)
+TWO_LINKS = {
+    "operational_point": {"body": "link2", "at": [0.0231, 0.0]},
+    "body": [
+        {"name": "link1", "mass": 1.7299, "inertia": 3.46e-4, "center": [0.0217, 0.0]},
+        {"name": "link2", "mass": 0.7758, "inertia": 1.552e-4, "center": [0.0231, 0.0]},
+    ],
+    "joint": [
+        {"name": "first", "child": "link1", "damping": 0.00563},
+        {"name": "second", "parent": "link1", "child": "link2", "at_parent": [0.0434, 0.0]},
+    ],
+    "start": {"first": 1.14, "second": -1.577},
+}
+PIN = {
+    "name": "pin", "type": "slot", "bodies": ["link2", "ground"],
+    "at": [[0.0462, 0.0], [0.0, 0.01988]], "axis": 0.0,
+}  # fmt: skip
+BESIDE: dict[str, Any] = {
+    "linkage": {**TWO_LINKS, "loop": [PIN]},
+    "device.extends": "pantograph-mk-ii",
+    "controller.bias": "full",
+    "controller.topology": False,
+    "controller.teleoperation.stiffness": [28.69, 28.69, 0.6621],
+    "controller.teleoperation.damping": [10.579, 10.579, 0.2466],
+    "hold": "second-order",
+    "haptics.rate": 1000,
+    "graphics.rate": 50,
+    "delays": {"virtual_mechanism.x": 0.003, "virtual_mechanism.v": 0.003},
+    "hand": {"type": "constant", "wrench": list(WRENCH), "damping": [4.0, 4.0, 0.004]},
+}
+"""Without topology controller the handle rests beside the operational point, here 30 mm off."""
+
+
+@pytest.fixture(scope="module")
+def led() -> tuple[Pose, dict[str, Case]]:
+    read = hl.scene("closed-loop-ideal", BESIDE)
+    assert read.linkage is not None
+    assert read.hand is not None
+    (pose,) = find_rest_poses(read, read.linkage)
+    hands = {"firm grip": hands_in(read.space)["firm grip"], OWN_FREE: linearise_hand(read.hand)}
+    cases, without = in_poses(read, [pose], hands, DRIFT)
+    assert not without
+    return pose, {case.hand: case for case in cases}
+
+
+def test_of_equilibria_side_by_side_that_one_is_judged_in_which_the_scenes_own_run_rests(
+    led: tuple[Pose, dict[str, Case]],
+) -> None:
+    pose, cases = led
+    run = hl.run("closed-loop-ideal", BESIDE | {"duration": 90.0, "stop_when": ""}, figures=False)
+    x = run["haptic_device.x_true"]
+    assert pose.handle == pytest.approx(x[-1], abs=2e-5)
+    assert np.linalg.norm(np.subtract(pose.handle, pose.point)[:2]) > 0.01
+    moved = np.abs(np.diff(x[::1000], axis=0)).max(axis=1)[50:85]
+    assert moved[0] > 10 * moved[-1] > 1e-9  # over a decade, and far above rounding
+    decay = np.polyfit(np.arange(len(moved)), np.log(moved), 1)[0]
+    assert cases[OWN_FREE].growth == pytest.approx(decay, rel=0.01)
+
+
+def test_there_the_hand_gives_the_wrench_of_the_scene_and_some_direction_is_free(
+    led: tuple[Pose, dict[str, Case]],
+) -> None:
+    _, cases = led
+    for case in cases.values():
+        assert case.at is not None
+        assert case.at.press == pytest.approx(WRENCH, abs=1e-6)
+        assert case.neutral
+
+
+def test_a_run_that_keeps_moving_is_told_with_the_wrench_at_the_equilibrium_beside_it() -> None:
+    found = hl.stability("closed-loop-ideal")
+    told = next(line for line in found.lines() if line.startswith("where its wrench leads: "))
+    assert "its run with 5 N.s/m of damping still moves at up to 3.2 rad/s" in told
+    F = next(case.at.press for case in found.cases if case.pose == found.poses[-1].name and case.at)
+    assert told.endswith(f"with ({F[0]:.3g}, {F[1]:.3g}, {F[2]:.3g}) N and N.m")
+    assert abs(F[0] + 0.5) > 0.005
+    run = hl.run(
+        "closed-loop-ideal", {"duration": 10.0, "hand.damping": [5.0, 5.0, 0.005]}, figures=False
+    )
+    rates = run["virtual_mechanism.qd"][-512:]
+    assert np.abs(rates).max() == pytest.approx(3.2, abs=0.05)
+
+
+def test_equilibria_side_by_side_are_told_where_nothing_resists_and_only_there() -> None:
+    def tells(options: dict[str, Any]) -> bool:
+        found = hl.stability("closed-loop-ideal", {**options, "graphics.rate": 64}, poses=1)
+        return any("side by side" in line for line in found.lines())
+
+    target = [[0.0, 0.0445, 0.0148, -0.788]]
+    spring = {"type": "spring", "stiffness": [100.0, 100.0, 0.3], "target": target}
+    assert tells({"hand": spring, "controller.topology": False})
+    assert not tells({"hand": spring})
