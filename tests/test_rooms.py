@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2991,
     "orchestrator": 16836,
     "programs": 1027,
-    "analysis": 9111,
+    "analysis": 9171,
     "visualization": 3845,
     "api": 640,
     "commands": 1638,
