@@ -87,6 +87,7 @@ class Recorder:
         self.due.value = self.count.value % self.every == 0 or self.count.value == self.end
         if self.count.value == self.before + 1:
             self._first()
+            del self._first  # which holds the results: rows would stay until cycles are searched
             self.room.value = self._make_room()
 
     def _make_room(self) -> int:

@@ -188,10 +188,12 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         for key, inside in value.items():
             if not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-            yield from find_unrepresentable(inside, (*path, key))
+            if not _is_fine(inside, path):
+                yield from find_unrepresentable(inside, (*path, key))
     elif isinstance(value, list):
         for i, inside in enumerate(value):
-            yield from find_unrepresentable(inside, (*path, i))
+            if not _is_fine(inside, path):
+                yield from find_unrepresentable(inside, (*path, i))
     elif isinstance(value, str):
         if not _is_unicode(value):
             yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"
@@ -202,7 +204,16 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         yield path, f"{value} should be a number, a text, true, false, a list or a table"
 
 
+def _is_fine(value: Any, path: Path) -> bool:
+    """Whether a value below a path is at once known to be representable: most are."""
+    kind = type(value)
+    fine = kind is float or kind is bool or (kind is str and value.isascii())
+    return fine and len(path) < DEEPEST
+
+
 def _is_unicode(text: str) -> bool:
+    if text.isascii():
+        return True
     try:
         text.encode()
     except UnicodeEncodeError:

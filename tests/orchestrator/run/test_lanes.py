@@ -25,8 +25,8 @@ def compare(scene: str, points: list[tuple[str, ...]], folder: Path) -> list[str
         alone = [content(scene, point, folder) for point in points]
     with process_cache.keep_unpacked():
         for _ in range(2):
-            together = simulate_together(scenes, folder, compiles=True)
-            assert [told(found) if found else None for found in together] == alone
+            together = simulate_together(scenes, folder, True, told)
+            assert together == alone
     return [run["end"]["reason"] for _, run in alone]
 
 
@@ -106,7 +106,7 @@ def test_a_signal_ends_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with process_cache.keep_unpacked():
         monkeypatch.setattr(interrupt, "raise_if_interrupted", interrupted)
         with pytest.raises(Interrupted):
-            simulate_together(scenes, tmp_path, compiles=True)
+            simulate_together(scenes, tmp_path, True, told)
 
 
 @pytest.mark.slow
