@@ -167,10 +167,11 @@ class RunResults:
         return not (self.published or awaited)
 
     def tables(self) -> dict[str, Table]:
-        """The tables by clock."""
+        """The tables by clock, which keep what is read of them."""
+        empty = np.zeros((0, 1))
         return {
             clock: Table(
-                r.columns, np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value]
+                r.columns, empty if r.rows is None else r.rows[: r.filled.value], kept={}
             )
             for clock, r in self._recorders.items()
         }

@@ -179,20 +179,27 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     return f"unknown key; {near(key, sorted(known))}"
 
 
+_NUMBERS = frozenset({float, bool})
+"""Types whose values a scene can all hold."""
+
+
 def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     """What no scene can hold, and where: tables without end, whole numbers that no type of FMI
     can, dates, text that cannot be written to a file."""
     if len(path) > DEEPEST:
         yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
     elif isinstance(value, dict):
-        for key, inside in value.items():
+        for key in () if "".join(value).isascii() else value:
             if not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-            if not _is_fine(inside, path):
+        for key, inside in value.items():
+            kind = type(inside)  # of most values it shows that they are fine
+            fine = kind in _NUMBERS or (kind is str and inside.isascii())
+            if not fine or len(path) == DEEPEST:
                 yield from find_unrepresentable(inside, (*path, key))
     elif isinstance(value, list):
-        for i, inside in enumerate(value):
-            if not _is_fine(inside, path):
+        if not _NUMBERS.issuperset(map(type, value)) or len(path) == DEEPEST:
+            for i, inside in enumerate(value):
                 yield from find_unrepresentable(inside, (*path, i))
     elif isinstance(value, str):
         if not _is_unicode(value):
@@ -204,16 +211,7 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         yield path, f"{value} should be a number, a text, true, false, a list or a table"
 
 
-def _is_fine(value: Any, path: Path) -> bool:
-    """Whether a value below a path is at once known to be representable: most are."""
-    kind = type(value)
-    fine = kind is float or kind is bool or (kind is str and value.isascii())
-    return fine and len(path) < DEEPEST
-
-
 def _is_unicode(text: str) -> bool:
-    if text.isascii():
-        return True
     try:
         text.encode()
     except UnicodeEncodeError:

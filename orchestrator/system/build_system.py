@@ -153,8 +153,8 @@ def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
 
 
 def _restarts(fmu: Fmu, block: BlockPlan) -> StartValues:
-    given = dict(_starts(fmu, block))
-    return tuple((s, given.get(s, value)) for s, value in fmu.starts)
+    given = {s.name: value for s, value in _starts(fmu, block)}
+    return tuple((s, given.get(s.name, value)) for s, value in fmu.starts)
 
 
 def _assemble(

@@ -65,6 +65,7 @@ static void take_step(Lanes *s, int64_t number) {
     const int64_t begin = now();
     ((StepOfLanes *)s->steps[op->a])(instances, s->n, t.begin, op->x, taken);
     const int64_t took = (now() - begin) / n;
+    keep_arithmetic(s->loops[0]->fmus[op->a].place); /* of the whole process */
     for (int64_t i = 0; i < s->n; i++) {
         Fmu *f = s->loops[i]->fmus + op->a;
         At *at = &s->events[i]->at;
@@ -74,7 +75,6 @@ static void take_step(Lanes *s, int64_t number) {
             continue;
         }
         f->place->steps++;
-        keep_arithmetic(f->place);
         note(s, i, fmu_end_step(f, 0, took, at));
     }
 }
