@@ -186,19 +186,15 @@ def _prepare(
 def _prepare_once(scene: Scene, every: System) -> Prepared:
     """The same, and kept for systems that `build_system` makes of this one by other start values,
     which shows in that they share all else."""
-    ready = _prepare_again(scene, every) or _prepare(scene, every, None, NOWHERE)
+    ready = _PREPARED.take(lambda item: item.differs_in_starts(every))
+    if ready is None:
+        ready = _prepare(scene, every, None, NOWHERE)
+    else:
+        system = ready.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
+        before = replace(ready.before, **describe_scene(scene))
+        ready = replace(ready, every=every, plan=ready.plan.of(system), before=before)
     _PREPARED.put(ready)
     return ready
-
-
-def _prepare_again(scene: Scene, every: System) -> Prepared | None:
-    """Made of what is kept; None where there is none."""
-    known = _PREPARED.take(lambda item: item.differs_in_starts(every))
-    if known is None:
-        return None
-    system = known.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
-    before = replace(known.before, **describe_scene(scene))
-    return replace(known, every=every, plan=known.plan.of(system), before=before)
 
 
 def _columns(system: System) -> dict[str, list[str]]:
@@ -389,8 +385,7 @@ def simulate_together(
         build_time = (perf_counter() - begin) / len(scenes)
         while ready:
             first = ready[0][1]
-            alike_ones = (each for each in ready if each[1].shares_events(first))
-            group = dict(islice(alike_ones, lanes.MOST))
+            group = dict(islice((e for e in ready if e[1].shares_events(first)), lanes.MOST))
             ready = [each for each in ready if each[0] not in group]
             done = _run_group([*group.values()], compiles)
             for (i, one), (outcome, memory) in zip(group.items(), done, strict=True):

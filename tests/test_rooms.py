@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2992,
     "orchestrator": 16564,
     "programs": 1027,
-    "analysis": 9122,
+    "analysis": 9121,
     "visualization": 3858,
     "api": 645,
     "commands": 1638,

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -208,15 +209,13 @@ def tabulate(
 def batches_of(jobs: Sequence[Job], processes: int) -> list[Sequence[Job]]:
     """The jobs by up to TOGETHER, those together whose clocks are set alike, since runs side by
     side share their events."""
-    ordered = sorted(jobs, key=_describe_clocks)
+    ordered = sorted(jobs, key=lambda job: repr(job.scene and _CLOCKS(job.scene)))
     size = max(1, min(TOGETHER, len(jobs) // (4 * processes)))
     size -= size % MOST if size > MOST else 0
     return [ordered[i : i + size] for i in range(0, len(jobs), size)]
 
 
-def _describe_clocks(job: Job) -> str:
-    scene = job.scene
-    return repr(scene and (scene.haptics, scene.graphics, scene.duration, scene.start_time))
+_CLOCKS = attrgetter("haptics", "graphics", "duration", "start_time")
 
 
 def _finished(

@@ -50,20 +50,20 @@ def without_start_values(
     scene does not set stays so: it is a part that the block does not have."""
     common, starts = dict(settings), dict[str, tuple[float, ...]]()
     for key, record in TABLES.get(block, {}).items():
-        first, path = key.split(".")
-        if getattr(common.get(first), path, None) is True:
-            common[first] = replace(common[first], **{path: record()})
-    nominal: dict[str, Any] = {}
+        first, *path = key.split(".")
+        if _at(common.get(first), path) is True:
+            common[first] = _with(common[first], path, record())
     for key, parameter in START_SETTINGS.get(block, {}).items():
-        path = key.split(".")
-        value = _at(common.get(path[0]), path[1:])
+        first, *path = key.split(".")
+        table: Any = common.get(first)
+        value = _at(table, path)
         if isinstance(value, tuple):
             starts[parameter] = value
-            _put(nominal, path, (NOMINAL,) * len(value))
+            common[first] = _with(table, path, (NOMINAL,) * len(value))
         elif isinstance(value, int | float) and not isinstance(value, bool):
             starts[parameter] = (value,)
-            _put(nominal, path, NOMINAL)
-    return common | {key: _with(common[key], changed) for key, changed in nominal.items()}, starts
+            common[first] = _with(table, path, NOMINAL)
+    return common, starts
 
 
 START_POSE = ("q_start", "q_ref")
@@ -95,15 +95,8 @@ def _at(table: Any, path: Sequence[str]) -> Any:
     return reduce(lambda inner, name: getattr(inner, name, None), path, table)
 
 
-def _put(tree: dict[str, Any], path: Sequence[str], value: Any) -> None:
-    """A value at a path of tables within one another, of which those that lack are made."""
-    for name in path[:-1]:
-        tree = tree.setdefault(name, {})
-    tree[path[-1]] = value
-
-
-def _with(table: Any, changed: Any) -> Any:
-    """The table with values at its keys, for tables within it again by their keys."""
-    if not isinstance(changed, dict):
-        return changed
-    return replace(table, **{key: _with(getattr(table, key), v) for key, v in changed.items()})
+def _with(table: Any, path: Sequence[str], value: Any) -> Any:
+    """The table with a value at a path below it."""
+    if not path:
+        return value
+    return replace(table, **{path[0]: _with(getattr(table, path[0]), path[1:], value)})

@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import typing
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import islice
 from typing import Any
 
@@ -179,28 +180,19 @@ def _unknown_key(path: Path, loc: Sequence[Any], data: Any) -> str:
     return f"unknown key; {near(key, sorted(known))}"
 
 
-_NUMBERS = frozenset({float, bool})
-"""Types whose values a scene can all hold."""
-
-
 def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     """What no scene can hold, and where: tables without end, whole numbers that no type of FMI
     can, dates, text that cannot be written to a file."""
     if len(path) > DEEPEST:
         yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
-    elif isinstance(value, dict):
-        for key in () if "".join(value).isascii() else value:
-            if not _is_unicode(key):
+    elif isinstance(value, dict | list):
+        for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(key, str) and not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-        for key, inside in value.items():
-            kind = type(inside)  # of most values it shows that they are fine
-            fine = kind in _NUMBERS or (kind is str and inside.isascii())
+            kind = type(inside)  # tells at once that most values are fine
+            fine = kind is float or kind is bool or (kind is str and inside.isascii())
             if not fine or len(path) == DEEPEST:
                 yield from find_unrepresentable(inside, (*path, key))
-    elif isinstance(value, list):
-        if not _NUMBERS.issuperset(map(type, value)) or len(path) == DEEPEST:
-            for i, inside in enumerate(value):
-                yield from find_unrepresentable(inside, (*path, i))
     elif isinstance(value, str):
         if not _is_unicode(value):
             yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"
@@ -212,8 +204,6 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
 
 
 def _is_unicode(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+    with suppress(UnicodeEncodeError):
+        return text.isascii() or bool(text.encode())
+    return False

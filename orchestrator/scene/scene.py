@@ -275,9 +275,8 @@ class Scene:
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
-        tables = {f.name: getattr(self, f.name) for f in fields(Scene)}
-        shared = {name: _tables_of(tables[name]) for name in ("linkage", "device")}
-        return Plain(plain(tables | shared))
+        shared = {name: _tables_of(getattr(self, name)) for name in ("linkage", "device")}
+        return Plain(plain(vars(self.plain()) | shared))
 
     def plain(self) -> Scene:
         """A copy of the scene without its origin."""
@@ -303,7 +302,7 @@ _TABLES: shelf.Shelf[tuple[object, Any]] = shelf.Shelf(8)
 def _tables_of(record: object) -> Any:
     """A record that many scenes share, as plain data."""
     known = _TABLES.take(lambda item: item[0] is record)
-    known = known or (record, Plain(plain(record)) if record else None)
+    known = known or (record, record and Plain(plain(record)))
     _TABLES.put(known)
     return known[1]
 

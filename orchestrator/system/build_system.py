@@ -175,7 +175,8 @@ def _assemble(
     of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
     ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
     if not exported:
-        ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
+        started = zip(ours, planned.own, strict=True)
+        ours = [replace(fmu, starts=_starts(fmu, block)) for fmu, block in started]
         ours = [_with_board(fmu, scene, problems) for fmu in ours]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (
@@ -264,12 +265,8 @@ def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
     return replace(fmu, description=describe_board(fmu.description), hardware=True, driver=driver)
 
 
-def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
-    """A block's FMU with the start values that its settings give parameters."""
-    return replace(fmu, starts=_starts(fmu, block))
-
-
 def _starts(fmu: Fmu, block: BlockPlan) -> StartValues:
+    """The start values that a block's settings give parameters of its FMU."""
     return tuple(
         (s, value)
         for port, values in block.starts.items()

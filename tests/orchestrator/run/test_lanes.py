@@ -49,8 +49,9 @@ def test_gains_and_hands_side_by_side(tmp_path: Path, monkeypatch: pytest.Monkey
     """Tables, energies, checks of steps, counts of calls, run.json: all but times."""
     counts = count_steps(monkeypatch)
     points = [(*BASE, wrench) for wrench in WRENCHES] + [(*BASE, gain) for gain in GAINS]
+    points += [(*BASE, WRENCHES[0], gain) for gain in GAINS]
     assert set(compare("closed-loop-ideal", points, tmp_path)) == {"duration"}
-    assert counts == [8, 8]
+    assert counts == [8, 2, 8, 2]
 
 
 def test_runs_that_end_early_or_fail_are_taken_out(
