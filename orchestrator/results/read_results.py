@@ -46,8 +46,8 @@ class Table(Mapping[str, Vector]):
     columns: tuple[str, ...]
     rows: Vector | RowsFile
     others: Mapping[str, Table] = field(default_factory=dict)
-    kept: dict[Any, Vector] | None = None
-    """The columns that have been read, of a table that keeps them, as arrays that nobody writes."""
+    # The columns that have been read, of a table that keeps them, as arrays that nobody writes.
+    _kept: dict[Any, Vector] | None = None
 
     def __getitem__(self, name: str) -> Vector:
         if (place := self._places.get(name)) is not None:
@@ -66,12 +66,12 @@ class Table(Mapping[str, Vector]):
     def _read(self, places: int | Sequence[int]) -> Vector:
         """Columns; of a file copies, which take less memory than the rows that are mapped."""
         if not isinstance(self.rows, RowsFile):
-            if self.kept is None:
+            if self._kept is None:
                 return self.rows[:, places]
-            if places not in self.kept:
-                self.kept[places] = found = self.rows[:, places]
+            if places not in self._kept:
+                self._kept[places] = found = self.rows[:, places]
                 found.flags.writeable = False
-            return self.kept[places]
+            return self._kept[places]
         found = np.empty((*np.shape(places), len(self.rows))).T
         for first in range(0, len(found), BLOCK):
             span = slice(first, first + BLOCK)

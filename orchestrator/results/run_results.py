@@ -170,6 +170,6 @@ class RunResults:
         """The tables by clock, which keep what is read of them."""
         empty = np.zeros((0, 1))
         return {
-            clock: Table(r.columns, empty if r.rows is None else r.rows[: r.filled.value], kept={})
+            clock: Table(r.columns, empty if r.rows is None else r.rows[: r.filled.value], _kept={})
             for clock, r in self._recorders.items()
         }
