@@ -34,12 +34,12 @@ from benchmarks.page import Progress, load_average, system, table
 from benchmarks.rows import Rows
 from hapticlink.analysis.sweep import run_sweep
 from hapticlink.analysis.sweep.job import job
+from hapticlink.analysis.sweep.run_sweep import TOGETHER
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import process, temporary_folders
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.run.compiled import lanes
-from hapticlink.orchestrator.run.compiled.lanes import MOST
 from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.programs.build import build_program
 
@@ -47,8 +47,8 @@ SCENE = "closed-loop-ideal"
 FIXED = ("packaging=native",)
 HOLDS = ("zoh", "foh", "lead", "delayed", "smooth")
 JOINTS = {"shoulder1": 0.785, "elbow1": -1.571, "shoulder2": -1.257, "elbow2": 1.571}
-WARM, POINTS, ROUNDS = MOST, 5 * MOST, 5
-"""Points of a round, behind twice as many as go side by side."""
+WARM, POINTS, ROUNDS = TOGETHER // 2, 2 * TOGETHER, 5
+"""Points of a round, behind as many as a process gets at a time."""
 COLUMNS = ("key", "form", "point_ms", "loop_ms")
 Point = dict[str, str]
 Run = Callable[[list[Point]], object]
@@ -87,7 +87,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes points.csv into `folder`."""
     (folder / "points.csv").unlink(missing_ok=True)
     rows = Rows(folder / "points.csv", COLUMNS, 2)
-    rounds, count = (1, 2 * MOST) if quick else (ROUNDS, POINTS)
+    rounds, count = (1, TOGETHER) if quick else (ROUNDS, POINTS)
     process.raise_gc_threshold()
     load = load_average()
     with ExitStack() as stack:
@@ -111,7 +111,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
                 return loop.of(ours, batches[2 * WARM // at_once :])
 
         forms: dict[str, Callable[[list[Point]], tuple[float, float]]] = {
-            "sweep": partial(kept, at_once=MOST),
+            "sweep": partial(kept, at_once=TOGETHER),
             "one by one": partial(kept, at_once=1),
             "runs alone": lambda points: loop.of(ours, [[p] for p in points[2 * WARM :]]),
             "FMPy": _fmpy(room, stack),

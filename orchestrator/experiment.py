@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, nullcontext, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -185,19 +186,15 @@ def _prepare(
 def _prepare_once(scene: Scene, every: System) -> Prepared:
     """The same, and kept for systems that `build_system` makes of this one by other start values,
     which shows in that they share all else."""
-    ready = _prepare_again(scene, every) or _prepare(scene, every, None, NOWHERE)
+    ready = _PREPARED.take(lambda item: item.differs_in_starts(every))
+    if ready is None:
+        ready = _prepare(scene, every, None, NOWHERE)
+    else:
+        system = ready.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
+        before = replace(ready.before, **describe_scene(scene))
+        ready = replace(ready, every=every, plan=ready.plan.of(system), before=before)
     _PREPARED.put(ready)
     return ready
-
-
-def _prepare_again(scene: Scene, every: System) -> Prepared | None:
-    """Made of what is kept; None where there is none."""
-    known = _PREPARED.take(lambda item: item.differs_in_starts(every))
-    if known is None:
-        return None
-    system = known.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
-    before = replace(known.before, **describe_scene(scene))
-    return replace(known, every=every, plan=known.plan.of(system), before=before)
 
 
 def _columns(system: System) -> dict[str, list[str]]:
@@ -363,55 +360,49 @@ def simulate(
     return ended
 
 
+Kept = TypeVar("Kept")
+
+
 @interrupt.defer_signals()
 def simulate_together(
-    scenes: Sequence[Scene], folder: Path, compiles: bool
-) -> list[Experiment | None]:
-    """The runs of scenes with results in memory, the same ones as of `simulate`: those that share
-    their events side by side, by vector instructions. None for a scene that cannot be run so.
+    scenes: Sequence[Scene], folder: Path, compiles: bool, of: Callable[[Experiment], Kept]
+) -> list[Kept | None]:
+    """What `of` gives of the runs of scenes with results in memory, the same ones as of `simulate`:
+    those that share their events go side by side, by vector instructions. None for a scene that
+    cannot be run so.
 
     compiles: whether to compile the steps of several instances that the cache lacks. Raises
     Interrupted.
     """
     begin, alike = perf_counter(), False  # whether scenes have differed in start values alone
-    ready: list[Prepared | None] = []
+    ready: list[tuple[int, Prepared]] = []
+    kept: list[Kept | None] = [None] * len(scenes)
     with ExitStack() as stack:
-        for scene in scenes:
-            ready.append(None)
+        for i, scene in enumerate(scenes):
             with suppress(InputFault):
                 every = build_again(scene) if alike else None
-                alike = every is not None or len(ready) == 1
+                alike = every is not None or i == 0
                 every = every or stack.enter_context(build_system(scene))
                 made = _prepare_once(scene, every)
                 if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
-                    ready[-1] = made
+                    ready.append((i, made))
         build_time = (perf_counter() - begin) / len(scenes)
-        ended: list[Experiment | None] = []
-        together = _run_together(ready, compiles)
-        for scene, one, (outcome, memory) in zip(scenes, ready, together, strict=True):
-            ended.append(None)
-            if one and not outcome:
-                memory = RunResults()
-                outcome = run(one.plan, memory)
-            if one and outcome:
-                ended[-1] = one.experiment(scene, outcome, folder, build_time, memory)
-    return ended
+        while ready:
+            first = ready[0][1]
+            group = dict(islice((e for e in ready if e[1].shares_events(first)), lanes.MOST))
+            ready = [each for each in ready if each[0] not in group]
+            done = _run_group([*group.values()], compiles)
+            for (i, one), (outcome, memory) in zip(group.items(), done, strict=True):
+                kept[i] = of(one.experiment(scenes[i], outcome, folder, build_time, memory))
+    return kept
 
 
-def _run_together(
-    ready: Sequence[Prepared | None], compiles: bool
-) -> list[tuple[Outcome | None, RunResults | None]]:
-    """The outcomes and results of those that share their events with others; None of the rest, and
-    of runs that did not last."""
-    made: list[tuple[Outcome | None, RunResults | None]] = [(None, None)] * len(ready)
-    waiting = [(i, one) for i, one in enumerate(ready) if one]
-    while waiting:
-        first = waiting[0][1]
-        group = [each for each in waiting if each[1].shares_events(first)]
-        waiting = [each for each in waiting if not each[1].shares_events(first)]
-        steps = lanes.find_steps(first.system, compiles) if len(group) > 1 else {}
-        runs = [(one.plan, RunResults()) for _, one in group] if steps else []
-        outcomes = run_side_by_side(runs, steps) if runs else []
-        for (i, _), outcome, (_, results) in zip(group, outcomes, runs, strict=False):
-            made[i] = outcome, results
-    return made
+def _run_group(group: Sequence[Prepared], compiles: bool) -> Iterator[tuple[Outcome, RunResults]]:
+    """The outcomes and results of runs that share their events, of those that did not last side by
+    side alone."""
+    runs = [(one.plan, RunResults()) for one in group]
+    steps = lanes.find_steps(group[0].system, compiles) if len(group) > 1 else {}
+    outcomes = run_side_by_side(runs, steps) if steps else [None] * len(runs)
+    for (plan, results), outcome in zip(runs, outcomes, strict=True):
+        alone = results if outcome else RunResults()
+        yield outcome or run(plan, alone), alone

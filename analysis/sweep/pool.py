@@ -34,29 +34,30 @@ from hapticlink.orchestrator.system.fmu_files import prefer_compiled
 Batch = Sequence[Job]
 Work = Callable[[Batch], Sequence[Row]]
 Done = tuple[Job, Row]
-BATCHES = 200
-"""Batches of a process before it is replaced, since libraries of FMUs stay loaded."""
+RUNS = 1600
+"""Runs of a process, about, before it is replaced, since libraries of FMUs stay loaded."""
 
 
 def in_processes(work: Work, batches: Sequence[Batch], count: int) -> Iterator[Done]:
     """Each job with its row, as they finish. Raises Interrupted after SIGINT or SIGTERM, when all
     processes have ended."""
-    queue = deque(batches)
+    queue, most = deque(batches), -(-RUNS // max(map(len, batches), default=1))
     while queue:
-        suspects = yield from _run_in_processes(work, queue, count)
+        suspects = yield from _run_in_processes(work, queue, count, most)
         for job in (job for batch in suspects for job in batch):
-            if (yield from _run_in_processes(work, deque([[job]]), 1)):
+            if (yield from _run_in_processes(work, deque([[job]]), 1, most)):
                 yield job, failed(DIED, "the process of this run crashed")
 
 
 def _run_in_processes(
-    work: Work, queue: deque[Batch], count: int
+    work: Work, queue: deque[Batch], count: int, most: int
 ) -> Generator[Done, None, list[Batch]]:
-    """Runs jobs from `queue` until it is empty; if a process dies, returns those in progress."""
+    """Runs jobs from `queue` until it is empty, up to `most` batches in a process; if a process
+    dies, returns those in progress."""
     in_progress: dict[Future[Sequence[Row]], Batch] = {}
     with ExitStack() as own:
         processes = _kept.get() or own.enter_context(_Processes())
-        pool = processes.start(count)
+        pool = processes.start(count, most)
         while queue or in_progress:
             try:
                 while queue and len(in_progress) < count:
@@ -101,9 +102,9 @@ class _Processes(ExitStack):
 
     _pool: ProcessPoolExecutor | None = None
 
-    def start(self, count: int) -> ProcessPoolExecutor:
-        """The pool, of `count` processes where there is none yet."""
-        self._pool = self._pool or self.enter_context(_executor(count))
+    def start(self, count: int, most: int) -> ProcessPoolExecutor:
+        """The pool, of `count` processes for up to `most` batches each, where there is none yet."""
+        self._pool = self._pool or self.enter_context(_executor(count, most))
         return self._pool
 
     def end(self) -> None:
@@ -127,7 +128,7 @@ def keep_processes() -> Iterator[None]:
 
 
 @contextmanager
-def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
+def _executor(count: int, most: int) -> Iterator[ProcessPoolExecutor]:
     before = set(multiprocessing.active_children())
 
     def kill() -> None:
@@ -140,7 +141,7 @@ def _executor(count: int) -> Iterator[ProcessPoolExecutor]:
     context = SpawnContext()  # FMUs hold threads and libraries: no fork
     context.Process = _Worker  # type: ignore[misc]
     pool = ProcessPoolExecutor(
-        count, mp_context=context, initializer=_follow, max_tasks_per_child=BATCHES
+        count, mp_context=context, initializer=_follow, max_tasks_per_child=most
     )
     try:
         yield pool

@@ -11,6 +11,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,8 @@ several points has them as `rows`."""
 Together = Callable[[Sequence[Job]], Sequence[Row | None]]
 """Of jobs, the rows of those that are done in one go."""
 Tell = Callable[[int], None]
+TOGETHER = 8 * MOST
+"""Runs that a process gets at a time, which share what is read and looked up for them."""
 MANY = 500
 """Runs of a sweep from which on it compiles steps of several instances: a third as long as it takes
 to compile them is won by so many, and all of it by the next sweeps."""
@@ -89,8 +92,7 @@ def run_together(
     scenes = [job.scene for job in jobs if job.scene]
     if key(scenes[0]) != jobs[0].key:
         return [None] * len(jobs)
-    made = simulate_together(scenes, Path(), compiles)
-    return [_row(experiment, measure) if experiment else None for experiment in made]
+    return simulate_together(scenes, Path(), compiles, partial(_row, measure=measure))
 
 
 def run(job: Job, results: Path, measure: Measure = measure) -> Row:
@@ -205,16 +207,15 @@ def tabulate(
 
 
 def batches_of(jobs: Sequence[Job], processes: int) -> list[Sequence[Job]]:
-    """The jobs by up to MOST, those together whose clocks are set alike, since runs side by side
-    share their events."""
-    ordered = sorted(jobs, key=_describe_clocks)
-    size = max(1, min(MOST, len(jobs) // (4 * processes)))
+    """The jobs by up to TOGETHER, those together whose clocks are set alike, since runs side by
+    side share their events."""
+    ordered = sorted(jobs, key=lambda job: repr(job.scene and _CLOCKS(job.scene)))
+    size = max(1, min(TOGETHER, len(jobs) // (4 * processes)))
+    size -= size % MOST if size > MOST else 0
     return [ordered[i : i + size] for i in range(0, len(jobs), size)]
 
 
-def _describe_clocks(job: Job) -> str:
-    scene = job.scene
-    return repr(scene and (scene.haptics, scene.graphics, scene.duration, scene.start_time))
+_CLOCKS = attrgetter("haptics", "graphics", "duration", "start_time")
 
 
 def _finished(

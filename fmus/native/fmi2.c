@@ -102,6 +102,12 @@ typedef struct { /* room in which a function calls the look-ups of tables */
     double w[N_W + 1];
 } Room;
 
+/* z, and what lanes.cpp keeps, are those of another state or of other parameters. */
+static void forget(Model *m) {
+    m->shared_time = NAN;
+    m->kept_by = NULL;
+}
+
 static void evaluate_output(Model *m, double time) {
     const double *arguments[N_ARG] = {m->now.x, m->now.reals, m->now.reals + N_U, &time};
     double *results[N_RES] = {m->now.reals + SETTABLE, m->shared};
@@ -143,7 +149,7 @@ static void restart(Model *m) {
     memcpy(m->now.reals, starts, SETTABLE * sizeof(double));
     m->now.mode = INSTANTIATED;
     m->now.start_due = m->now.output_due = 1;
-    m->shared_time = NAN;
+    forget(m);
     m->left_out = 0;
     m->unread = m->unread_before = 0;
     m->stop = INFINITY;
@@ -241,7 +247,7 @@ fmi2Status fmi2SetReal(fmi2Component c, References vr, size_t n, const fmi2Real 
             if (is_fixed[vr[i]])
                 return fail(m, fmi2Error, "parameter %s is fixed; set it before the end of "
                             "initialisation mode", names[vr[i]]);
-        m->shared_time = NAN;
+        forget(m);
     }
     for (size_t i = 0; i < n; i++) m->now.reals[vr[i]] = value[i];
     if (!initialized) m->now.start_due = 1;
@@ -283,7 +289,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real start, fmi2Real size, fmi2Boolea
     if (N_Z && m->shared_time != start) evaluate_output(m, start);
     /* Until the step is accepted, a plant's outputs are to be evaluated again. */
     m->now.output_due = !SAMPLED;
-    m->shared_time = NAN;
+    forget(m);
     memcpy(m->trial, m->now.x, sizeof m->trial);
     const int less = REDUCED && (m->unread >= RARELY || m->unread_before >= RARELY);
     for (int k = 0; k < SUBSTEPS; k++) {
@@ -332,7 +338,7 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate state) {
     Model *m = c;
     if (!is_ours(m, state)) return fmi2Error;
     memcpy(&m->now, state, sizeof(State));
-    m->shared_time = NAN;
+    forget(m);
     m->left_out = 0;
     return fmi2OK;
 }

@@ -19,6 +19,7 @@ typedef struct {
     double shared[N_Z + 1], next[N_Z + 1]; /* z, and the one after a step */
     double stop;                           /* INFINITY where none is defined */
     double shared_time;                    /* for which z was evaluated; NAN: it is out of date */
+    const void *kept_by;                   /* what has p, x and z in lanes.cpp; NULL: they may be others */
     int left_out;                          /* whether the last step left out outputs */
     long long unread, unread_before; /* steps since outputs on request were read, and before that */
     char name[];

@@ -72,17 +72,29 @@ namespace {
 
 int leaves_out(const Model *m) { return REDUCED && (m->unread >= RARELY || m->unread_before >= RARELY); }
 
+/* What the instances of the last step have, each in its lane, so that it is not gathered for every step:
+ * that of `of` at a `time`, as long as it is kept_by this. z is in one of two places, the newest in `turn`. */
+struct Kept {
+    Number x[N_X + 1], p[N_P + 1], z[2][N_Z + 1];
+    const Model *of[LANES];
+    double time[LANES];
+    int turn;
+};
+thread_local Kept kept;
+
+int is_kept(const Kept *k, const Model *m, int lane, double start) {
+    return m->kept_by == k && k->of[lane] == m && k->time[lane] == start;
+}
+
 /* Whether fmi2DoStep would take this step without a word, and without more than a step. */
 int is_regular(const Model *m, double start, double size) {
     const double end = start + size, near = NEAR * size;
     return m->now.mode == STEP && !m->now.start_due && size > 0.0 && isfinite(end)
-           && fabs(start - m->now.time) <= near && !(end > m->stop + near)
-           && !(N_Z && m->shared_time != start);
+           && fabs(start - m->now.time) <= near && !(end > m->stop + near);
 }
 
-void gather(Number *into, const double *const *from, int n) {
-    for (int i = 0; i < n; i++)
-        for (int l = 0; l < LANES; l++) into[i].v[l] = from[l][i];
+void gather(Number *into, int lane, const double *from, int n) {
+    for (int i = 0; i < n; i++) into[i].v[lane] = from[i];
 }
 
 void scatter(const Number *from, int lane, double *into, int n) {
@@ -96,42 +108,55 @@ int are_finite(const Number *values, int lane, int n) {
 }
 }
 
-/* The step of `n` instances; `taken` says which have taken it. The others, of which something is to be
- * told or done besides, are as before. */
+/* The step of `n` instances, NULL where there is none in a lane; `taken` says which have taken it. The
+ * others, of which something is to be told or done besides, are as before. */
 extern "C" __attribute__((visibility("default"))) void step_lanes(
     void *const *instances, int64_t n, double start, double size, int64_t *taken
 ) {
-    Model *m[LANES];
-    const double *x_of[LANES], *reals_of[LANES], *shared_of[LANES];
-    for (int l = 0; l < LANES; l++) {
-        m[l] = (Model *)instances[l < n ? l : 0];
-        x_of[l] = m[l]->now.x;
-        reals_of[l] = m[l]->now.reals;
-        shared_of[l] = m[l]->shared;
+    Kept *const k = &kept;
+    Number u[N_U + 1], x[N_X + 1], after[N_X + 1], y[N_Y + 1], *z = k->z[k->turn], *next = k->z[!k->turn];
+    int less = -1;
+    for (int l = 0; l < n; l++) {
+        const Model *m = (const Model *)instances[l];
+        taken[l] = 0;
+        if (!m) continue;
+        const int known = is_kept(k, m, l, start), leaves = leaves_out(m);
+        if (less < 0) less = leaves;
+        if (!is_regular(m, start, size) || leaves != less) continue;
+        if (!known && N_Z && m->shared_time != start) continue;
+        taken[l] = 1;
+        gather(u, l, m->now.reals, N_U);
+        if (known) continue;
+        gather(k->x, l, m->now.x, N_X);
+        gather(k->p, l, m->now.reals + N_U, N_P);
+        gather(z, l, m->shared, N_Z);
     }
-    const int less = leaves_out(m[0]);
-    for (int l = 0; l < n; l++) taken[l] = is_regular(m[l], start, size) && leaves_out(m[l]) == less;
-    Number x[N_X + 1], reals[SETTABLE + 1], shared[N_Z + 1], after[N_X + 1], y[N_Y + 1], next[N_Z + 1];
     Number time, h = size / SUBSTEPS, end = start + size;
-    gather(x, x_of, N_X);
-    gather(reals, reals_of, SETTABLE);
-    gather(shared, shared_of, N_Z);
-    const Number *arguments[] = {x, reals, reals + N_U, &time, &h, &end, shared};
+    const Number *arguments[] = {x, u, k->p, &time, &h, &end, z};
     Number *results[] = {after, y, next};
-    for (int k = 0; k < SUBSTEPS; k++) {
-        time = start + k * size / SUBSTEPS;
-        (k != WITH_OUTPUTS ? substep : less ? reduced : advance)(arguments, results, 0, 0, 0);
+    memcpy(x, k->x, N_X * sizeof *x);
+    for (int i = 0; i < SUBSTEPS; i++) {
+        time = start + i * size / SUBSTEPS;
+        (i != WITH_OUTPUTS ? substep : less ? reduced : advance)(arguments, results, 0, 0, 0);
         memcpy(x, after, N_X * sizeof *x);
     }
-    for (int l = 0; l < n; l++) {
-        taken[l] = taken[l] && are_finite(x, l, N_X) && (!SAMPLED || are_finite(y, l, N_Y));
-        if (!taken[l]) continue;
-        scatter(x, l, m[l]->now.x, N_X);
-        scatter(y, l, m[l]->now.reals + SETTABLE, N_Y);
-        scatter(next, l, m[l]->shared, N_Z);
-        m[l]->now.time = m[l]->shared_time = start + size;
-        m[l]->now.output_due = 0;
-        m[l]->left_out = less;
-        m[l]->unread++;
+    memcpy(k->x, x, N_X * sizeof *x);
+    k->turn = !k->turn;
+    for (int l = 0; l < LANES; l++) {
+        Model *m = l < n && taken[l] ? (Model *)instances[l] : NULL;
+        if (m && are_finite(x, l, N_X) && (!SAMPLED || are_finite(y, l, N_Y))) {
+            scatter(x, l, m->now.x, N_X);
+            scatter(y, l, m->now.reals + SETTABLE, N_Y);
+            m->now.time = k->time[l] = start + size;
+            m->shared_time = NAN;
+            m->kept_by = k;
+            m->now.output_due = 0;
+            m->left_out = less;
+            m->unread++;
+        } else if (l < n) {
+            taken[l] = 0;
+            m = NULL;
+        }
+        k->of[l] = m;
     }
 }

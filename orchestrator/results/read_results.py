@@ -48,6 +48,8 @@ class Table(Mapping[str, Vector]):
     rows: Vector | RowsFile
     others: Mapping[str, Table] = field(default_factory=dict)
     texts: rows_file.Texts = field(default_factory=dict)
+    # The columns that have been read, of a table that keeps them, as arrays that nobody writes.
+    _kept: dict[Any, Vector] | None = None
 
     def __getitem__(self, name: str) -> Vector:
         if (place := self._places.get(name)) is not None:
@@ -75,7 +77,12 @@ class Table(Mapping[str, Vector]):
 
     def _read_numbers(self, places: int | Sequence[int]) -> Vector:
         if not isinstance(self.rows, RowsFile):
-            return self.rows[:, places]
+            if self._kept is None:
+                return self.rows[:, places]
+            if places not in self._kept:
+                self._kept[places] = found = self.rows[:, places]
+                found.flags.writeable = False
+            return self._kept[places]
         found = np.empty((*np.shape(places), len(self.rows))).T
         for first in range(0, len(found), BLOCK):
             span = slice(first, first + BLOCK)

@@ -92,6 +92,7 @@ class Recorder:
         self.due.value = self.count.value % self.every == 0 or self.count.value == self.end
         if self.count.value == self.before + 1:
             self._first()
+            del self._first  # which holds the results: rows would stay until cycles are searched
             self.room.value = self._make_room()
 
     def _make_room(self) -> int:
@@ -171,12 +172,14 @@ class RunResults:
         return not (self.published or awaited)
 
     def tables(self) -> dict[str, Table]:
-        """The tables by clock."""
+        """The tables by clock, which keep what is read of them."""
+        empty = np.zeros((0, 1))
         return {
             clock: Table(
                 r.columns,
-                np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value],
+                empty if r.rows is None else r.rows[: r.filled.value],
                 texts=name_texts(r.texts, known_texts()),
+                _kept={},
             )
             for clock, r in self._recorders.items()
         }

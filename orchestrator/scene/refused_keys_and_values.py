@@ -6,6 +6,7 @@ from __future__ import annotations
 import copy
 import typing
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import islice
 from typing import Any
 
@@ -185,14 +186,14 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     can, dates, text that cannot be written to a file."""
     if len(path) > DEEPEST:
         yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
-    elif isinstance(value, dict):
-        for key, inside in value.items():
-            if not _is_unicode(key):
+    elif isinstance(value, dict | list):
+        for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
+            if isinstance(key, str) and not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-            yield from find_unrepresentable(inside, (*path, key))
-    elif isinstance(value, list):
-        for i, inside in enumerate(value):
-            yield from find_unrepresentable(inside, (*path, i))
+            kind = type(inside)  # tells at once that most values are fine
+            fine = kind is float or kind is bool or (kind is str and inside.isascii())
+            if not fine or len(path) == DEEPEST:
+                yield from find_unrepresentable(inside, (*path, key))
     elif isinstance(value, str):
         if not _is_unicode(value):
             yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"
@@ -204,8 +205,6 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
 
 
 def _is_unicode(text: str) -> bool:
-    try:
-        text.encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+    with suppress(UnicodeEncodeError):
+        return text.isascii() or bool(text.encode())
+    return False

@@ -31,6 +31,7 @@ from hapticlink.components.specs.hand import (
 )
 from hapticlink.components.specs.linkage import Directions, GraphicsCopy, Linkage, Mechanism
 from hapticlink.components.specs.quantities import Duration, Elapsed, Substeps
+from hapticlink.orchestrator.base import shelf
 from hapticlink.orchestrator.base.errors import Finding
 from hapticlink.orchestrator.base.plain_data import Plain, plain
 from hapticlink.orchestrator.base.signal_names import WORKSPACE_MARGIN, by_user
@@ -273,7 +274,8 @@ class Scene:
 
     def tables(self) -> dict[str, Any]:
         """The scene as plain data."""
-        return Plain(plain(self.plain()))
+        shared = {name: _tables_of(getattr(self, name)) for name in ("linkage", "device")}
+        return Plain(plain(vars(self.plain()) | shared))
 
     def plain(self) -> Scene:
         """A copy of the scene without its origin."""
@@ -291,6 +293,17 @@ class Scene:
             simulated = self.device and not (self.device.driver and self.device.driver.active)
             return f"{WORKSPACE_MARGIN} < 0" if simulated else ""
         return self.stop_when
+
+
+_TABLES: shelf.Shelf[tuple[object, Any]] = shelf.Shelf(8)
+
+
+def _tables_of(record: object) -> Any:
+    """A record that many scenes share, as plain data."""
+    known = _TABLES.take(lambda item: item[0] is record)
+    known = known or (record, record and Plain(plain(record)))
+    _TABLES.put(known)
+    return known[1]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)

@@ -7,12 +7,12 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
-from copy import deepcopy
 from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.scene.scene_tables import Latency
 
 LARGEST = 2**23
@@ -98,7 +98,7 @@ def read_document(text: str) -> tuple[dict[str, Any], Mapping[Path, int]]:
     """The tables of a TOML text, and the line number of each path; entries of arrays of tables have
     their index in the path. Raises ValueError."""
     tables, lines = _read_once(text)
-    return deepcopy(tables), lines
+    return plain(tables), lines
 
 
 @lru_cache(64)  # the same files in each variant of a scene

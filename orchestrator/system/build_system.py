@@ -157,8 +157,8 @@ def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
 
 
 def _restarts(fmu: Fmu, block: BlockPlan) -> StartValues:
-    given = dict(_starts(fmu, block))
-    return tuple((s, given.get(s, value)) for s, value in fmu.starts)
+    given = {s.name: value for s, value in _starts(fmu, block)}
+    return tuple((s, given.get(s.name, value)) for s, value in fmu.starts)
 
 
 def _assemble(
@@ -179,7 +179,8 @@ def _assemble(
     of, order = time.of, {b.name: i for i, b in enumerate(planned.loop)}
     ours = [Fmu(b.name, describe_once(files[b.name]), of[b.name]) for b in planned.own]
     if not exported:
-        ours = [_started(fmu, block) for fmu, block in zip(ours, planned.own, strict=True)]
+        started = zip(ours, planned.own, strict=True)
+        ours = [replace(fmu, starts=_starts(fmu, block)) for fmu, block in started]
         ours = [_with_board(fmu, scene, problems) for fmu in ours]
     tables = [*fmu_tables.fmus(scene, files, replaced, problems)]
     foreign = (
@@ -270,12 +271,8 @@ def _with_board(fmu: Fmu, scene: Scene, problems: list[Problem]) -> Fmu:
     return replace(fmu, description=about, hardware=True, in_its_place=driver)
 
 
-def _started(fmu: Fmu, block: BlockPlan) -> Fmu:
-    """A block's FMU with the start values that its settings give parameters."""
-    return replace(fmu, starts=_starts(fmu, block))
-
-
 def _starts(fmu: Fmu, block: BlockPlan) -> StartValues:
+    """The start values that a block's settings give parameters of its FMU."""
     return tuple(
         (s, value)
         for port, values in block.starts.items()

@@ -71,9 +71,8 @@ def fmu_files(
         given: Starts = {}
         experiment: dict[str, float] = {}
         settings, packaging = block.settings, scene.packaging
-        prefers = _prefers_compiled.get() and not scene.resume  # a state fits the FMU that saved it
-        if prefers and not block.engine and has_compiled(block.block, settings):
-            packaging = "native"
+        # A state fits the FMU that saved it.
+        prefers = _prefers_compiled.get() and not (scene.resume or block.engine)
         if starts is not None:
             steps = sizes(timeline.of[block.name], timeline)
             given = {
@@ -91,9 +90,11 @@ def fmu_files(
         }
         compiled = packaging == "native" and not block.engine
         compiler = compiler_version() if compiled else ""
-        made_of = repr((block.block, settings, how, cached_in, compiler))
+        made_of = repr((block.block, settings, how, prefers, cached_in, compiler))
         if path := _find_again(made_of):
             return path
+        if prefers and has_compiled(block.block, settings):
+            how["packaging"] = "native"
         own = room / block.name  # two hands are two files of one name
         found = find_block(block.block, settings, own, **how, poll=interrupt.raise_if_interrupted)
         if isinstance(found, Path) and not plugins.list_plugins():

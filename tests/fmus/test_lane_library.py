@@ -88,7 +88,8 @@ def made(name: str) -> Component:
 @pytest.mark.parametrize("name", NAMES)
 def test_steps_at_once_have_the_bits_of_single_steps(name: str, tmp_path: Path) -> None:
     """Inputs and gains differ between the instances, of which one reads its outputs at
-    seldom; what a step needs besides is left to the instance alone."""
+    seldom; what a step needs besides is left to the instance alone. Now and then a lane is empty,
+    a gain is set, or a state is put back."""
     path = build_native(made(name), tmp_path)
     assert lane_library.compile_steps(path, tmp_path / "lanes.so")
     together = lane_library.load_steps(tmp_path / "lanes.so")
@@ -104,7 +105,6 @@ def test_steps_at_once_have_the_bits_of_single_steps(name: str, tmp_path: Path) 
                 for p in parameters:
                     slave.setReal([p.valueReference], [float(p.start) * (1 + 1e-3 * i)])
                 initialize(slave)
-        instances = (ctypes.c_void_p * LANES)(*(slave.component for slave in slaves[1]))
         counts = []
         for k in range(STEPS):
             spread = 2.0 if name == "operations" else 0.01
@@ -116,7 +116,17 @@ def test_steps_at_once_have_the_bits_of_single_steps(name: str, tmp_path: Path) 
                 for slave, values in zip(each, given, strict=True):
                     if inputs:
                         slave.setReal(inputs, values)
-            together(instances, n, k * H, H, taken)
+                if parameters and k % 5 == 4:
+                    each[k % LANES].setReal([parameters[-1].valueReference], [0.1 * k])
+                if k % 7 == 3:
+                    state = each[k % LANES].getFMUState()
+                    each[k % LANES].doStep(k * H, H / 2)
+                    each[k % LANES].setFMUState(state)
+            lanes = [slave.component for slave in slaves[1]]
+            if k % 11 == 7:
+                lanes[k % LANES] = None
+            together((ctypes.c_void_p * LANES)(*lanes), n, k * H, H, taken)
+            assert lanes[k % LANES] or not taken[k % LANES]
             counts.append(sum(taken[:n]))
             for i, (alone, beside) in enumerate(zip(*slaves, strict=True)):
                 alone.doStep(k * H, H)

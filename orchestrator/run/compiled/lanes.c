@@ -40,9 +40,8 @@ static void note(Lanes *s, int64_t lane, int code) {
 /* Operation `number`, a step, in all runs that stand at it. */
 static void take_step(Lanes *s, int64_t number) {
     const Op *op = s->loops[0]->ops + number;
-    Fmu *fmus[MOST_LANES];
-    void *instances[MOST_LANES];
-    int64_t lanes[MOST_LANES], taken[MOST_LANES], n = 0;
+    void *instances[MOST_LANES] = {NULL}; /* each in its own lane */
+    int64_t taken[MOST_LANES], n = 0;
     StepTimes t = {.first = INT64_MIN};
     locate_step(s->loops[0], op, s->events[0]->tick, &t);
     for (int64_t i = 0; i < s->n; i++) {
@@ -58,22 +57,25 @@ static void take_step(Lanes *s, int64_t number) {
             note(s, i, fmu_step_with_halves(f, t.begin, t.end, op->x, due, at));
             continue;
         }
-        fmus[n] = f, instances[n] = f->fmu, lanes[n++] = i;
+        fmu_begin_step(f, t.begin, t.end, op->x);
+        instances[i] = f->fmu;
+        n++;
     }
     if (!n) return;
-    for (int64_t k = 0; k < n; k++) fmu_begin_step(fmus[k], t.begin, t.end, op->x);
     const int64_t begin = now();
-    ((StepOfLanes *)s->steps[op->a])(instances, n, t.begin, op->x, taken);
+    ((StepOfLanes *)s->steps[op->a])(instances, s->n, t.begin, op->x, taken);
     const int64_t took = (now() - begin) / n;
-    for (int64_t k = 0; k < n; k++) {
-        At *at = &s->events[lanes[k]]->at;
-        if (!taken[k]) {
-            note(s, lanes[k], fmu_step(fmus[k], t.begin, t.end, op->x, at));
+    keep_arithmetic(s->loops[0]->fmus[op->a].place); /* of the whole process */
+    for (int64_t i = 0; i < s->n; i++) {
+        Fmu *f = s->loops[i]->fmus + op->a;
+        At *at = &s->events[i]->at;
+        if (!instances[i]) continue;
+        if (!taken[i]) {
+            note(s, i, fmu_step(f, t.begin, t.end, op->x, at));
             continue;
         }
-        fmus[k]->place->steps++;
-        keep_arithmetic(fmus[k]->place);
-        note(s, lanes[k], fmu_end_step(fmus[k], 0, took, at));
+        f->place->steps++;
+        note(s, i, fmu_end_step(f, 0, took, at));
     }
 }
 

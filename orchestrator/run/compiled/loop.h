@@ -344,7 +344,8 @@ typedef struct {
     At at;
 } Events;
 
-/* Takes a step of `n` instances at once; `taken` says which have taken it: fmus/native/lanes.cpp. */
+/* Takes a step of `n` instances at once, NULL where there is none; `taken` says which have taken it:
+ * fmus/native/lanes.cpp. */
 typedef void StepOfLanes(void *const *instances, int64_t n, double start, double size, int64_t *taken);
 
 enum { MOST_LANES = 8 };

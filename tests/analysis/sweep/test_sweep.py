@@ -358,11 +358,18 @@ def pids(batch: pool.Batch) -> list[row.Row]:
     return [{"pid": os.getpid()} for _ in batch]
 
 
-def test_processes_are_kept_for_further_rounds_and_replaced_where_one_dies() -> None:
+def test_processes_are_kept_for_further_rounds_and_replaced(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Where one dies, and after a number of runs."""
+
     def round_of(*keys: str) -> list[object]:
         batches = [[Job({}, None, key)] for key in keys]
         return [made.get("pid") for _, made in pool.in_processes(pids, batches, 1)]
 
+    monkeypatch.setattr(pool, "RUNS", 2)
+    assert len({*round_of("a", "b", "c")}) == 2
+    monkeypatch.undo()
     with pool.keep_processes():
         (first,), again = round_of("a"), round_of("b", "c")
         assert again == [first, first]
@@ -601,3 +608,5 @@ def test_points_of_one_rate_are_in_one_batch() -> None:
     assert [len({job.point["graphics.rate"] for job in batch}) for batch in batches] == [1] * 4
     assert sorted(map(id, jobs)) == sorted(id(job) for batch in batches for job in batch)
     assert [len(batch) for batch in run_sweep.batches_of(jobs, 4)] == [2] * 16
+    assert [len(batch) for batch in run_sweep.batches_of(jobs[:1] * 100, 1)] == [24] * 4 + [4]
+    assert [len(batch) for batch in run_sweep.batches_of(jobs * 20, 2)] == [64] * 10

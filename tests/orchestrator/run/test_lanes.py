@@ -25,8 +25,8 @@ def compare(scene: str, points: list[tuple[str, ...]], folder: Path) -> list[str
         alone = [content(scene, point, folder) for point in points]
     with process_cache.keep_unpacked():
         for _ in range(2):
-            together = simulate_together(scenes, folder, compiles=True)
-            assert [told(found) if found else None for found in together] == alone
+            together = simulate_together(scenes, folder, True, told)
+            assert together == alone
     return [run["end"]["reason"] for _, run in alone]
 
 
@@ -49,8 +49,9 @@ def test_gains_and_hands_side_by_side(tmp_path: Path, monkeypatch: pytest.Monkey
     """Tables, energies, checks of steps, counts of calls, run.json: all but times."""
     counts = count_steps(monkeypatch)
     points = [(*BASE, wrench) for wrench in WRENCHES] + [(*BASE, gain) for gain in GAINS]
+    points += [(*BASE, WRENCHES[0], gain) for gain in GAINS]
     assert set(compare("closed-loop-ideal", points, tmp_path)) == {"duration"}
-    assert counts == [8, 8]
+    assert counts == [8, 2, 8, 2]
 
 
 def test_runs_that_end_early_or_fail_are_taken_out(
@@ -106,7 +107,7 @@ def test_a_signal_ends_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     with process_cache.keep_unpacked():
         monkeypatch.setattr(interrupt, "raise_if_interrupted", interrupted)
         with pytest.raises(Interrupted):
-            simulate_together(scenes, tmp_path, compiles=True)
+            simulate_together(scenes, tmp_path, True, told)
 
 
 @pytest.mark.slow
