@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7515,
-    "fmus": 2992,
-    "orchestrator": 16564,
-    "programs": 1027,
-    "analysis": 9122,
-    "visualization": 3858,
+    "components": 7521,
+    "fmus": 2998,
+    "orchestrator": 16566,
+    "programs": 1045,
+    "analysis": 9123,
+    "visualization": 3868,
     "api": 645,
     "commands": 1638,
 }
