@@ -64,7 +64,7 @@ def _smallest_source(
     start = np.frombuffer(state, offset=len(state) - 8 * sum(v.size for v in component.states))
     if by_inputs.nnz() or any(changes[i] for i in by_parameters.get_col()):
         start = start[:0]
-    return component_source(component, 0, start)
+    return component_source(component, 0, start.tolist())
 
 
 def compile_page(texts: Mapping[str, str], folder: Path) -> bytes:

@@ -26,7 +26,7 @@ def component_source(
     """
     parts = functions_of_fmu(component)
     unused = [parts.advance] if parts.reduced and not rarely else []
-    unused += [parts.initialize] if len(start) else []
+    unused += [parts.initialize] if start else []
     text, pieces = functions(f for f in parts.functions if all(f is not out for out in unused))
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
@@ -43,7 +43,7 @@ def component_source(
         "SAMPLED": int(component.timing == "sampled"),
         "REDUCED": int(parts.reduced is not None),
         "RARELY": rarely,
-        "KNOWN_START": int(len(start) > 0),
+        "KNOWN_START": int(bool(start)),
         # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
