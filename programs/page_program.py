@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 
 from hapticlink.components.component import Component
 from hapticlink.fmus.native.compiler import compile_webassembly
-from hapticlink.fmus.native.source import functions, table
+from hapticlink.fmus.native.source import component_source, functions, table
 from hapticlink.programs import refusals
 from hapticlink.programs.build import OPTIONS
 from hapticlink.programs.foreign import write_files
-from hapticlink.programs.ports import Port
+from hapticlink.programs.ports import Port, find_fed
 from hapticlink.programs.resolve_scene import Resolved
-from hapticlink.programs.sources import HERE, add_prefix, write_sources
+from hapticlink.programs.sources import HERE, Source, add_prefix, write_sources
 
 PAGE = "page.c"
 """What stands in place of the FMU's own file, and includes it."""
@@ -32,18 +34,37 @@ class Drawing:
 
 
 def write_page_sources(
-    program: Resolved, components: Mapping[str, Component], ports: Sequence[Port], drawing: Drawing
+    program: Resolved,
+    components: Mapping[str, Component],
+    ports: Sequence[Port],
+    drawing: Drawing,
+    offered: Container[str],
 ) -> dict[str, str]:
-    """The C files of the module, whose functions are those of page.c. Raises InputFault for FMUs of
-    others with resources."""
+    """The C files of the module, whose functions are those of page.c. offered: the parameters,
+    `block.name`, that the page may set. Raises InputFault for FMUs of others with resources."""
     reading = (name for name, foreign in program.foreign.items() if foreign.resources)
     reasons = (f"{name} has resources, files that a page lacks" for name in reading)
     refusals.refuse(program.scene.title, reasons)
-    texts = write_sources(program, components, ports)
+    texts = write_sources(program, components, ports, partial(_smallest_source, program, offered))
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
     texts["scene.h"] = f'#define GUID ""\n{texts["scene.h"]}'
     return texts
+
+
+def _smallest_source(
+    program: Resolved, offered: Container[str], fmu: str, component: Component
+) -> Source:
+    """The text of a block that starts with the states that it has in the scene, where they follow
+    from parameters alone that the page does not change; outputs on request are read seldom."""
+    fed, every = find_fed(program.system, fmu), component.parameters
+    changes = [f"{fmu}.{v.name}" in offered or n in fed for v in every for n in v.names]
+    by_inputs, by_parameters = (component.initialize.jac_sparsity(0, i) for i in (0, 1))
+    state = program.instance(fmu).serialized()  # which ends with them
+    start = np.frombuffer(state, offset=len(state) - 8 * sum(v.size for v in component.states))
+    if by_inputs.nnz() or any(changes[i] for i in by_parameters.get_col()):
+        start = start[:0]
+    return component_source(component, 0, start.tolist())
 
 
 def compile_page(texts: Mapping[str, str], folder: Path) -> bytes:

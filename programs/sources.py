@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from hapticlink.components.component import Component
@@ -22,16 +22,21 @@ from hapticlink.programs.ports import Port
 from hapticlink.programs.resolve_scene import Resolved
 
 HERE = Path(__file__).parent
+Source = tuple[str, Iterable[str]]
+"""As of `component_source`."""
 OWN = ("program.c", "prepared_changes.h", "platform.c")
 LEFT_OUT = ("platform.c", "process_state.c", "lanes.c")
 """Files of the loop in whose place a program has its own platform.c, and that for several runs."""
 
 
 def write_sources(
-    resolved: Resolved, components: Mapping[str, Component], ports: Sequence[Port]
+    resolved: Resolved,
+    components: Mapping[str, Component],
+    ports: Sequence[Port],
+    source: Callable[[str, Component], Source] = lambda fmu, component: component_source(component),
 ) -> dict[str, str]:
     """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
-    this project."""
+    this project, of which `source` gives the text."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in LEFT_OUT}
     files |= {path.name: path.read_text() for path in INCLUDED}
     files["hold_table.h"] = loop.HOLD_TABLE
@@ -45,7 +50,7 @@ def write_sources(
             guids[fmu] = resolved.foreign[fmu].description.guid
             files |= resolved.foreign[fmu].sources(id_, {*functions})
         else:
-            guids[fmu], own = _member(id_, components[fmu])
+            guids[fmu], own = _member(id_, *source(fmu, components[fmu]))
             files |= own
     files["scene.h"] = _scene(resolved, ports, ids, guids, functions)
     return files
@@ -56,10 +61,9 @@ def identifiers(names: Iterable[str]) -> dict[str, str]:
     return {name: f"{re.sub(r'[^A-Za-z0-9]', '_', name)}_{i}" for i, name in enumerate(names)}
 
 
-def _member(id_: str, component: Component) -> tuple[str, dict[str, str]]:
+def _member(id_: str, header: str, pieces: Iterable[str]) -> tuple[str, dict[str, str]]:
     """The GUID of a block, and its files: fmi2.c with the component's functions, all names that the
     linker sees with the block's prefix."""
-    header, pieces = component_source(component)
     guid = guid_of(sha(header))
     prefix = f"#undef fmi2FullName\n#define fmi2FullName(name) {id_}_ ## name\n"
     own = f'{prefix}#define GUID "{guid}"\n{header}'

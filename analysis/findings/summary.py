@@ -500,8 +500,9 @@ def _start(results: Results) -> Iterator[str]:
         and device[WORKSPACE_MARGIN][0] < 0
         and not results.record.fault
     ):
-        start, margin = device[HANDLE_POSE][0], device[WORKSPACE_MARGIN][0]
-        yield f"warning: {describe_start_outside(space_of(results), start, margin)}"
+        point = of_port(results, POINT_POSE)  # which the device may not reach
+        start = point[POINT_POSE][0] if point else device[HANDLE_POSE][0]
+        yield f"warning: {describe_start_outside(space_of(results), start)}"
     yield from _start_apart(results)
     pulls = of_port(results, HAND_WRENCH)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:

@@ -33,7 +33,7 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
     yield from (f"{what}: {told}" for what, told in vars(device.origin).items() if told)
     distance = float(margin(device, np.array([start]))[0])
     if distance < 0:
-        yield f"warning: {describe_start_outside(device.space, start, distance)}"
+        yield f"warning: {describe_start_outside(device.space, start)}"
     else:
         yield f"the handle starts at {write_pose(start)}, {distance:.3g} m from the nearest stop"
 

@@ -1,9 +1,9 @@
 """Directions within the loop closures, in which the state of a mechanism is perturbed.
 
 Where closures are redundant, a pose off them contradicts them, and a step from there has no result.
-The coordinates q of such a block, and their rates qd, are moved along an orthonormal basis of
-null(W), W = dh/dq, in place of one by one. Other mechanisms are moved off their closures as well,
-so that the map has the modes of their stabilisation.
+The states q and qd of such a block are moved along an orthonormal basis of null(W), W = dh/dq, in
+place of one by one. Other mechanisms are moved off their closures as well, so that the map has the
+modes of their stabilisation.
 """
 
 from __future__ import annotations
@@ -43,39 +43,34 @@ class Closures:
                     i
                     for i in free
                     if (c := coordinates[i]).kind == "fmu"
+                    and not c.inert
                     and (c.owner, c.variable.partition("[")[0]) == (block, name)
                 ]
                 for name in ("q", "qd")
             }
-            basis = self._basis(point[places["q"]][-self._n :] if places["q"] else None)
+            basis = self._basis(point[places["q"]])
             if basis is None:
                 continue
             for indices in places.values():
-                # Inputs and outputs of the same name come before the states.
                 bound.update(indices)
-                for first in range(0, len(indices), self._n):
-                    for column in basis.T:
-                        direction = np.zeros(len(point))
-                        direction[indices[first : first + self._n]] = column
-                        yield direction
+                for column in basis.T:
+                    direction = np.zeros(len(point))
+                    direction[indices] = column
+                    yield direction
         for i in free:
             if i not in bound:
                 direction = np.zeros(len(point))
                 direction[i] = 1.0
                 yield direction
 
-    @property
-    def _n(self) -> int:
-        return len(self.linkage.coordinate_units) if self.linkage else 0
-
     @cached_property
     def _jacobian(self) -> Callable[[Vector], Matrix]:
         assert self.linkage is not None
         return closure_jacobian(self.linkage)
 
-    def _basis(self, q: Vector | None) -> Matrix | None:
+    def _basis(self, q: Vector) -> Matrix | None:
         """A basis of null(W) at q, None where no closure is redundant."""
-        if q is None or self.linkage is None or not self.linkage.closed:
+        if not len(q) or self.linkage is None or not self.linkage.closed:
             return None
         W = self._jacobian(q)
         basis: Matrix = null_space(W, rcond=RANK)

@@ -19,7 +19,7 @@ file.
 
 from __future__ import annotations
 
-from collections.abc import Container, Hashable, Iterable
+from collections.abc import Container, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -370,17 +370,16 @@ class ForwardSensitivity:
             if self._copies(operation) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
         self.work.counts["differentiated"] += 1
-        inert = np.zeros(len(read), bool)
-        if known:  # what nothing reads, as outputs, has the slopes that it has anywhere
-            coordinates = self._coordinates(key, state, template)
-            inert = np.array([coordinates[i].inert for i in read], bool)
+        coordinates = self._coordinates(key, state, template)
+        # What nothing reads, as outputs, has the slopes that it has anywhere.
+        inert = np.array([bool(known) and coordinates[i].inert for i in read], bool)
 
         def carried(point: Vector) -> Vector:
             state.put(template, point)
             call(tick)
             return state.now()[written]
 
-        along = self._directions(key, state, template, read[~inert], z)
+        along = self._directions(operation, coordinates, read[~inert], z)
         widths = STEP * np.maximum(1.0, np.abs(np.where(along != 0.0, z, 0.0)).max(axis=1))
         ways = (1.0,) if self._linear(operation) else (1.0, -1.0)
         points = [z + way * widths[:, None] * along for way in ways]
@@ -470,11 +469,17 @@ class ForwardSensitivity:
         return self._named[key]
 
     def _directions(
-        self, key: Any, state: StateVector, template: Any, read: NDArray[np.intp], z: Vector
+        self,
+        operation: Instruction,
+        coordinates: Sequence[StateEntry],
+        read: NDArray[np.intp],
+        z: Vector,
     ) -> Matrix:
-        """The directions in which the numbers z are moved, a row each."""
-        coordinates = self._coordinates(key, state, template)
+        """The directions in which the numbers z are moved, a row each: for what copies them one by
+        one, since it knows of no closures, and has the same slopes in every pose."""
         free = np.array([i for i in read if not discrete(coordinates[i])], dtype=np.intp)
+        if self._copies(operation):
+            return np.eye(len(z))[free]
         along = [*self.closures.directions(coordinates, free, z)]
         return np.array(along).reshape(-1, len(z))
 

@@ -319,7 +319,7 @@ class _Made:
         true = {
             "x_true": directions.pose(model.handle(z, p), p["x_start"]),
             "v_true": directions.put(v),
-            "workspace_margin": ca.mmin(model.margins(z, p)),
+            "workspace_margin": model.least_margin(z, p),
         }
         start = model.place_at_pose(p["x_start"], p), ca.SX.zeros(directions.size)
         at_rest = dict(zip(self._motion.names, start, strict=True))

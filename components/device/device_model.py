@@ -107,17 +107,27 @@ class DeviceModel(ABC):
 
     # What follows for any kind
 
+    def gaps(self, z: ca.SX, p: Parameters) -> ca.SX:
+        """The gaps (m) of the loops that a place may leave open."""
+        return ca.SX(0, 1)
+
     def place_at_pose(self, pose: ca.SX, p: Parameters | None = None) -> ca.SX:
         """The place at which the handle is at a pose (3,), from the start on; p by default as
         numbers."""
         y, start = self.directions.pick(pose), ca.SX(ca.DM(self.start_place))
         return self.place_at(y, start, self.numbers if p is None else p, FROM_START)
 
-    def least_margin(self, pose: ca.SX) -> ca.SX:
-        """The smallest of `margins` at a pose (3,), or how far the device is from reaching it."""
+    def least_margin(self, z: ca.SX, p: Parameters, *off: ca.SX) -> ca.SX:
+        """The smallest of `margins`; where loops are open, or anything else is `off`, how far."""
+        least, apart = ca.mmin(self.margins(z, p)), ca.vertcat(self.gaps(z, p), *off)
+        if not apart.numel():
+            return least
+        return ca.if_else(ca.norm_2(apart) < REACHED, least, -ca.norm_2(apart))
+
+    def margin_at(self, pose: ca.SX) -> ca.SX:
+        """The smallest of `margins` at a pose (3,); negative where no place is found."""
         z, p = self.place_at_pose(pose), self.numbers
-        off = ca.norm_2(self.handle(z, p) - self.directions.pick(pose))
-        return ca.if_else(off < REACHED, ca.mmin(self.margins(z, p)), -off)
+        return self.least_margin(z, p, self.handle(z, p) - self.directions.pick(pose))
 
     def angles(self, z: ca.SX, p: Parameters) -> ca.SX:
         """q, the coordinates of the joints with encoders, (e,)."""

@@ -46,17 +46,21 @@ class JointCoordinates(DeviceModel):
     def rate(self, z: ca.SX, v: ca.SX, p: Parameters) -> ca.SX:
         return self._rates(z, p) @ v
 
+    def gaps(self, z: ca.SX, p: Parameters) -> ca.SX:
+        at = self._at(ca.SX.sym("q", z.numel()), p)
+        return self._placed(at.h, at, z)
+
     def moved(self, z: ca.SX, dy: ca.SX, p: Parameters) -> ca.SX:
         q = z + self.rate(z, dy, p)
         if not self.device.loop:
             return q
         kept = ca.SX(self.directions.size, 1)
-        return q - ca.solve(self._matrix(q, p), ca.vertcat(self._gaps(q, p), kept))
+        return q - ca.solve(self._matrix(q, p), ca.vertcat(self.gaps(q, p), kept))
 
     def place_at(self, y: ca.SX, guess: ca.SX, p: Parameters, iterations: int) -> ca.SX:
         q = guess
         for _ in range(iterations):
-            off = ca.vertcat(self._gaps(q, p), self.handle(q, p) - y)
+            off = ca.vertcat(self.gaps(q, p), self.handle(q, p) - y)
             q = q - ca.solve(self._matrix(q, p), off)
         return q
 
@@ -103,11 +107,6 @@ class JointCoordinates(DeviceModel):
         """A."""
         at = self._at(ca.SX.sym("q", q.numel()), p)
         return self._placed(ca.vertcat(at.W, self.directions.pick(at.J_h)), at, q)
-
-    def _gaps(self, q: ca.SX, p: Parameters) -> ca.SX:
-        """h."""
-        at = self._at(ca.SX.sym("q", q.numel()), p)
-        return self._placed(at.h, at, q)
 
     @staticmethod
     def _placed(value: ca.SX, at: LinkageModel, q: ca.SX) -> ca.SX:

@@ -25,7 +25,7 @@ Range = tuple[float, float]
 
 def margin(device: Device, poses: Field) -> Field:
     """Smallest distance (m) of the device to its stops, shape (n,), at poses (x m, y m, theta rad)
-    of shape (n, 3); negative outside the workspace."""
+    of shape (n, 3); negative outside the workspace, and where no place of its joints is found."""
     margins = evaluate_rows(_margin_function(device), poses)[:, 0]
     return np.where(np.isfinite(margins), margins, -np.inf)
 
@@ -33,7 +33,7 @@ def margin(device: Device, poses: Field) -> Field:
 @cache
 def _margin_function(device: Device) -> ca.Function:
     pose = ca.SX.sym("pose", 3)
-    return ca.Function("margin", [pose], [device_model(device).least_margin(pose)], {"cse": True})
+    return ca.Function("margin", [pose], [device_model(device).margin_at(pose)], {"cse": True})
 
 
 @cache

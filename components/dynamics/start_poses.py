@@ -30,11 +30,11 @@ class StartPoses:
 
     def __init__(self, linkage: Linkage) -> None:
         p = Signals("p", [*parameters(linkage), *start_parameters(linkage)])
-        q, qd = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
-        gaps = [ca.norm_2(c.h) for c in LinkageModel(linkage, p, q, qd).closures]
+        q, _ = assemble(LinkageModel(linkage, p, p["q_start"], p["qd_start"]))
         self._model = model = LinkageModel.symbolic(linkage, p)
+        gaps = ca.vertcat(ca.SX(0, 1), *(ca.norm_2(c.h) for c in model.closures))
         self._linkage, self._fixed = linkage, Signals("p", parameters(linkage)).starts
-        self._gaps = ca.Function("gaps", [p.vector], [ca.vertcat(ca.SX(0, 1), *gaps)])
+        self._gaps = ca.Function("gaps", [p.vector], ca.substitute([gaps], [model.q], [q]))
         self._W = ca.Function("W", [model.q, p.vector], [model.W])
 
     def choose(self, start: Mapping[str, Any]) -> Choice | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import casadi as ca
 
@@ -14,14 +14,20 @@ from hapticlink.fmus.fmu_functions import RARELY, functions_of_fmu, on_request
 from hapticlink.fmus.native.split_functions import split_functions
 
 
-def component_source(component: Component) -> tuple[str, Iterable[str]]:
+def component_source(
+    component: Component, rarely: int = RARELY, start: Sequence[float] = ()
+) -> tuple[str, Iterable[str]]:
     """component.h (sizes, names, start values and functions) and the texts of further C files, with
     pieces of long functions, as `split_functions.split`; the same texts for the same component.
+    With `rarely` = 0 outputs on request are never evaluated in a step, and with the states `start`
+    these are not computed: there is less code.
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
     parts = functions_of_fmu(component)
-    text, pieces = functions(parts.functions)
+    unused = [parts.advance] if parts.reduced and not rarely else []
+    unused += [parts.initialize] if start else []
+    text, pieces = functions(f for f in parts.functions if all(f is not out for out in unused))
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]
@@ -36,7 +42,8 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
         "SUBSTEPS": component.substeps,
         "SAMPLED": int(component.timing == "sampled"),
         "REDUCED": int(parts.reduced is not None),
-        "RARELY": RARELY,
+        "RARELY": rarely,
+        "KNOWN_START": int(bool(start)),
         # Working memory that the functions need to call the look-ups of tables.
         **{f"N_{of.upper()}": _room(text, of) for of in ("arg", "res", "iw", "w")},
     }
@@ -46,6 +53,7 @@ def component_source(component: Component) -> tuple[str, Iterable[str]]:
             table("char *const names", map(json.dumps, names)),
             table("char *const state_names", map(json.dumps, component.state_texts)),
             table("double starts", map(number, starts)),
+            table("double start_states", map(number, start)),
             table("char is_fixed", (str(int(flag)) for flag in fixed)),
             table("char on_request", (str(int(flag)) for flag in on_request(component))),
             text,

@@ -336,7 +336,7 @@ def _find_start_outside(outcome: Outcome, simulation: Simulation) -> FmuFault | 
     device = _left_workspace(outcome, simulation)
     own = device and simulation.system.fmu[device].description.block == DEVICE
     if own and not outcome.details.calls[device].get("step"):
-        return start_outside(device, simulation.instances[device])
+        return start_outside(device, simulation)
     return None
 
 

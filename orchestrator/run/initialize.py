@@ -324,11 +324,14 @@ def require_finite(instances: Mapping[str, Instance]) -> None:
         instance.require_finite()
 
 
-def start_outside(fmu: str, device: Instance) -> FmuFault:
-    """The fault of a run that ends before its first step, outside of the device's workspace."""
-    outputs = zip(device.description.outputs, device.outputs.tolist(), strict=True)
-    start = {scalar.name: (value, scalar.unit) for scalar, value in outputs}
-    pose, units = zip(*(start[f"x_true[{i}]"] for i in range(1, 1 + PLANE.size)), strict=True)
+def start_outside(fmu: str, fmus: LoadedFmus) -> FmuFault:
+    """The fault of a run that ends before its first step, outside of the device's workspace: with
+    the pose that the device is given, at which it may not be."""
+    scalars, signals = fmus.instances[fmu].description.port("x_true", "output"), fmus.signals
+    given = (c for c in fmus.system.connections if (c.target, c.target_port) == (fmu, "x_start"))
+    places = [[*signals.sources(c)] for c in given]
+    places.append([signals.scalar(fmu, s.name) for s in scalars])
+    units = tuple(s.unit for s in scalars)
     space = next(each for each in (PLANE, POINT) if each.pose.units == units)
-    told = describe_start_outside(space, pose, start["workspace_margin"][0])
+    told = describe_start_outside(space, signals.values[places[0]].tolist())
     return FmuFault(fmu, told, 0.0, repeatable=True)

@@ -178,7 +178,9 @@ def test_webassembly_has_the_bits_of_the_same_c_with_the_same_sine(tmp_path: Pat
         made = components(program)
         variables = ports(program, made)
         description = PageDescription(program, variables, "page")
-        files = write_page_sources(program, made, variables, description.drawing)
+        files = write_page_sources(
+            program, made, variables, description.drawing, description.data["parameters"]
+        )
     references = description.data["parameters"]
     pull = dict(zip(references["hand.target"], (0.06, -0.01, 0.0), strict=True))
     pull |= dict(zip(references["hand.stiffness"], mouse(PLANE)[0], strict=True))

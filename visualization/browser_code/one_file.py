@@ -16,6 +16,7 @@ PAGE = Path(__file__).parent
 POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
 """Content security policy of the file: what is in it, and nothing from elsewhere."""
 IMPORT = re.compile(r'^import \{ (.+?) \} from "\./(\w+\.js)";$', re.MULTILINE)
+COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)
 EXPORT = re.compile(r"^export (?=(?:class|function|const) (\w+))", re.MULTILINE)
 
 
@@ -25,16 +26,18 @@ def page(name: str, texts: Mapping[str, str], policy: str = POLICY) -> str:
     tag = f'<meta http-equiv="Content-Security-Policy" content="{escape(policy)}">'
     html = html.replace('<meta charset="utf-8">', f'<meta charset="utf-8">\n{tag}', 1)
     html = re.sub(r'<link rel="icon" href="(.+?)">', _icon, html)
-    html = re.sub(r'<link rel="stylesheet" href="(.+?)">', _style, html)
-    kept = "".join(
-        f'<script type="application/json" id="{element}">{text}</script>\n'
-        for element, text in texts.items()
-    )
+    sheets = re.compile(r'<link rel="stylesheet" href="(.+?)">\n?')
+    kept = "".join(_element(name, text) for name, text in texts.items())
+    kept += _element("style", pack_text("".join(map(_text, sheets.findall(html))).encode()))
     return re.sub(
         r'<script type="module" src="(.+?)"></script>',
-        lambda found: f'{kept}<script type="module">\n{bundle(found[1])}</script>',
-        html,
+        lambda found: kept + _element("script", pack_text(bundle(found[1]).encode())) + LOADER,
+        sheets.sub("", html),
     )
+
+
+def _element(name: str, text: str) -> str:
+    return f'<script type="application/json" id="{name}">{text}</script>\n'
 
 
 def headers(policy: str) -> dict[str, str]:
@@ -86,6 +89,7 @@ def _needs(name: str) -> Iterator[str]:
 
 def _module(name: str) -> str:
     text = _text(name)
+    text = COMMENT.sub("", text)
     text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
     return EXPORT.sub("", text)
 
@@ -103,9 +107,17 @@ def _text(name: str) -> str:
     return (PAGE / name).read_text(encoding="utf-8")
 
 
-def _style(match: re.Match[str]) -> str:
-    return f"<style>\n{_text(match[1])}</style>"
-
-
 def _icon(match: re.Match[str]) -> str:
     return f'<link rel="icon" href="data:image/svg+xml,{quote(_text(match[1]))}">'
+
+
+LOADER = f"""<script type="module">
+{bundle("packed.js")}
+const script = document.createElement("script");
+script.type = "module";
+script.textContent = await unpackedText("script");
+const style = document.createElement("style");
+style.textContent = await unpackedText("style");
+document.head.append(style, script);
+</script>"""
+"""Styles the page and runs its script, which are compressed, too."""

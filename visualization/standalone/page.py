@@ -46,7 +46,8 @@ def html(scene: Scene, name: str) -> str:
             blocks = components(program)
             variables = ports(program, blocks)
             description = PageDescription(program, variables, name)
-            files = write_page_sources(program, blocks, variables, description.drawing)
+            offered = description.data["parameters"]
+            files = write_page_sources(program, blocks, variables, description.drawing, offered)
         module = _compile_page(files, room)
     verdict = predict_stability(scene, {}, description.parameters)
     description.data["map"] = {"type": "map"} | verdict

@@ -19,7 +19,15 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene.blocks import blocks
 from tests.components.blocks.test_start_settings import content
 
-SCENES = ("closed-loop", "closed-loop-ideal", "serial", "two-users", "six-bar", "peaucellier")
+SCENES = (
+    "closed-loop",
+    "closed-loop-ideal",
+    "closed-loop-bricard",
+    "serial",
+    "two-users",
+    "six-bar",
+    "peaucellier",
+)
 HOLD = {"closed-loop": "hold=model"}
 
 

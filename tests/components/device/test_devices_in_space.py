@@ -6,8 +6,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
+import hapticlink as hl
 from hapticlink.components.device.models import device_model
-from hapticlink.components.device.workspace import extents_along
+from hapticlink.components.device.workspace import extents_along, margin
+from hapticlink.orchestrator import open_scene
+from hapticlink.orchestrator.scene import read_and_check
 from tests.devices import device
 
 ARM, SHIN, C, D, E, F, R, S = 0.060, 0.1025, 0.01443, 0.01125, 0.01125, -0.025, 0.0400, -0.02309
@@ -43,6 +46,7 @@ def test_angles_of_a_delta_are_those_of_its_inverse_kinematics():
 L1, L2, L3 = 0.215, 0.170, 0.0325
 M_A, I_A = 0.0202, (0.4864e-4, 0.001843e-4, 0.4864e-4)
 M_C, I_C = 0.0249, (0.959e-4, 0.959e-4, 0.0051e-4)
+SERIAL_RANGES = [(-1.5708, 1.5708), (-1.07, 1.2), (-0.4, 1.2), (-1.13, 0.96)]
 I_BE, I_DF, I_BASE = (11.09e-4, 10.06e-4, 0.591e-4), (7.11e-4, 0.629e-4, 6.246e-4), 11.87e-4
 
 
@@ -95,3 +99,84 @@ def test_the_workspace_of_a_delta_is_told_about_its_start_alone():
         assert arm_angle(np.array([0.0, 0.0, at + 0.12]), math.radians(15)) == pytest.approx(
             angle, abs=0.12
         )
+
+
+def delta_angles(place):
+    """Of the three arms with the base at (0, 0, -0.12); NaN where an arm does not reach."""
+    try:
+        return [
+            arm_angle((place[0], place[1], place[2] + 0.12), math.radians(at))
+            for at in (15, 135, 255)
+        ]
+    except ValueError:
+        return [math.nan] * 3
+
+
+def serial_angles(place):
+    """Base, upper arm, forearm and elbow of the inverse of `place_of_handle`; NaN out of reach."""
+    out, up = math.hypot(place[0], place[2] + L1), place[1] - L2
+    far = math.hypot(out, up)
+    inner = (L1**2 + far**2 - L2**2) / (2 * L1 * far)
+    second = math.atan2(up, out) + (math.acos(inner) if abs(inner) < 1 else math.nan)
+    third = math.atan2(out - L1 * math.cos(second), L1 * math.sin(second) - up)
+    return [math.atan2(place[0], place[2] + L1), second, third, third - second]
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "angles", "ranges", "missed"),
+    [
+        ("ideal-3", 3.0, np.array, [(-2.0, 2.0)] * 3, 0.0),
+        ("falcon", 0.12, delta_angles, [(-0.5, 1.2)] * 3, 0.0),
+        ("phantom-premium", 0.4, serial_angles, SERIAL_RANGES, 0.4),
+    ],
+)
+def test_no_pose_is_called_inside_that_the_closed_form_has_outside(
+    name, size, angles, ranges, missed
+):
+    """Of random poses. The angles of some within a serial arm's reach, far from its start, are not
+    found, which the message leaves open."""
+    places = np.random.default_rng(3).uniform(-size, size, (300, 3))
+    low, high = np.transpose(ranges)
+    q = np.array([angles(place) for place in places])
+    inside = ((q > low) & (q < high)).all(axis=1)
+    found = margin(device(name), places) >= 0
+    assert inside.sum() > 5
+    assert not (found & ~inside).any()
+    assert (inside & ~found).sum() <= missed * inside.sum()
+
+
+BAR = """
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.6] }
+[[linkage.body]]
+name = "bar"
+mass = 0.3
+inertia = 1e-3
+[[linkage.joint]]
+name = "joint"
+type = "universal"
+child = "bar"
+at_parent = [0.0, 0.0, -0.1]
+axis = [1.0, 0.0, 0.0]
+second_axis = [0.0, 1.0, 0.0]
+[controller.teleoperation]
+stiffness = [200.0, 200.0, 200.0]
+damping = [20.0, 20.0, 20.0]
+[hand]
+type = "constant"
+wrench = [0.2, -0.1, 0.3]
+"""
+
+
+@pytest.mark.parametrize("name", ["falcon", "phantom-premium"])
+def test_a_start_that_is_not_reached_is_told_with_the_pose_that_was_asked_for(name):
+    """A delta's loops are open there, and the handle of a serial arm is elsewhere: neither has a
+    distance to a stop."""
+    scene = f'title = "far"\nduration = 0.1\ngraphics.rate = 32\n{BAR}[device]\nextends = "{name}"'
+    lost = hl.run(open_scene.load(read_and_check.read_scene(scene, [])), figures=False)
+    told = "haptic_device: the start pose (x m, y m, z m) = ("
+    *_, third = str(lost.fault).partition(told)[2].partition(")")[0].split(", ")
+    assert float(third) == pytest.approx(0.5)
+    assert (
+        " is outside the device's workspace, or too far from the device's own start" in lost.fault
+    )

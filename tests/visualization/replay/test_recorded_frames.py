@@ -137,7 +137,7 @@ def test_text_of_a_scene_cannot_end_the_data(tmp_path: Path) -> None:
     title = "</script><script>alert(1)</script><!--"
     hl.run("closed-loop-ideal", {"duration": 0.05, "title": title}, out=tmp_path, figures=False)
     html = replay_page.html([Recorded(str(tmp_path))])
-    assert html.count("<script") == html.count("</script>") == 2
+    assert html.count("<script") == html.count("</script>") == 4
     assert told_by(html)["runs"][0]["title"] == title
 
 
