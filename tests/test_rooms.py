@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7499,
-    "fmus": 2991,
-    "orchestrator": 16839,
-    "programs": 1027,
-    "analysis": 9170,
-    "visualization": 3845,
+    "components": 7505,
+    "fmus": 2997,
+    "orchestrator": 16841,
+    "programs": 1045,
+    "analysis": 9171,
+    "visualization": 3855,
     "api": 640,
     "commands": 1638,
 }
