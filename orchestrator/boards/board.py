@@ -110,6 +110,8 @@ class Board(Instance):
         self._applied = self.safe.sent
         self._stepped = self._rests = False
         self._stack = ExitStack()
+        self.workers = "normal"
+        """The priority of the kernel's workers that pass on the bytes of a serial port."""
 
     # --- before the run -------------------------------------------------------------------
 
@@ -173,7 +175,7 @@ class Board(Instance):
         try:
             self._open(driver)
             if words := driver.zero_torque_when_killed():
-                self._stack.enter_context(write_if_killed(*words))
+                self.workers = self._stack.enter_context(write_if_killed(*words))
         except (Silent, OSError) as error:
             raise self._fault(f"the board at {self._table.port} {_told(error)}", 0.0) from None
         self._driver = driver

@@ -1,4 +1,4 @@
-"""A board that is a process: the firmware of the open teaching kit behind a socket, with a
+"""A board that is a process: the firmware of the open teaching kit on a pseudo-terminal, with a
 device and a hand that are simulated beside it. It shares nothing with the driver of that protocol.
 
 `simulated_plant.py` has it in a process. The firmware is that of
