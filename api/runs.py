@@ -48,9 +48,8 @@ def with_board(port: str) -> dict[str, Any]:
 
 
 def _ending(stop: Callable[[], bool]) -> Callable[..., None]:
-    def turn(simulation: Simulation, loop: CompiledLoop) -> None:
-        if any(fmu.hardware for fmu in simulation.system.fmus):
-            loop.events.patience(0)  # a turn after each event: a hand waits for it
+    def turn(_: Simulation, loop: CompiledLoop) -> None:
+        loop.events.patience(0)  # a turn after each event: a hand may wait for it
         if stop():
             raise Ended("stopped")
 
@@ -88,10 +87,9 @@ def run(
     (docs/real-time.md), at `speed` times that of the clock, less than 1 for slow motion. `arrivals`
     is the folder of a run in real time, whose samples arrive here when they arrived there. `device`
     is the port of the board in the place of the simulated device (docs/your-device.md); `stop` is
-    asked whether the run in real time is to end, about every 20 ms, with hardware at each of its
-    ticks, and `ready` is told what to do with the handle of a board that has a `home`, and returns
-    when it is done. `remote` has the addresses HOST:PORT of FMUs, or of all FMUs at a rate, that
-    `hapticlink serve` serves on other
+    asked at every tick whether the run in real time is to end, and `ready` is told what to do with
+    the handle of a board that has a `home`, and returns when it is done. `remote` has the addresses
+    HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other
     computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when the
     state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
     "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is

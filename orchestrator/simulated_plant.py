@@ -25,7 +25,7 @@ from typing import Any
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.signal_names import (
     DEVICE,
     HAND,
@@ -67,12 +67,11 @@ class SimulatedPlant:
             for name in self._order
             if (incoming := system.into(name))
         }
-        device = system.fmu[DEVICE].description
         self._tau, self._q = (
             [fmus.signals.scalar(signal.partition(".")[0], s.name) for s in ports]
             for signal, ports in (
                 (MOTOR_TORQUES, system.fmu[MOTOR_MAP].description.port("tau", "output")),
-                (MOTOR_ANGLES, device.port("q_true", "output")),
+                (MOTOR_ANGLES, system.fmu[DEVICE].description.port("q_true", "output")),
             )
         )
         wiring = Wiring.of(
@@ -199,4 +198,7 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
 
 
 if __name__ == "__main__":
-    serve(json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), sys.argv[3] == "1")
+    try:
+        serve(json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), sys.argv[3] == "1")
+    except Fault as fault:  # the device has diverged, or its FMUs have failed
+        sys.exit(f"{SIMULATED_BOARD} has ended: {fault}")

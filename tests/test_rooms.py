@@ -32,11 +32,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7515,
     "fmus": 2992,
-    "orchestrator": 16579,
+    "orchestrator": 16561,
     "programs": 1027,
-    "analysis": 9122,
-    "visualization": 3858,
-    "api": 647,
+    "analysis": 9123,
+    "visualization": 3859,
+    "api": 646,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and

@@ -23,26 +23,19 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 
-PASSED_ON = 0.05
-"""Time (s) for workers to pass a message on before they have the normal priority again."""
-
 
 def main(port: int, shared: int, priority: int, message: bytes) -> None:
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     with suppress(AttributeError, OSError):
-        _schedule(0, priority + 2)  # above the haptic loop
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority + 2))  # above the loop
     lock = ctypes.c_char.from_buffer(mmap.mmap(shared, 0)) if shared >= 0 else None
     with raise_workers(priority) if os.isatty(port) else nullcontext() as raised:
         print(f"SCHED_FIFO {priority}" if raised else "normal", flush=True)
         died = lock and ctypes.pythonapi.pthread_mutex_lock(ctypes.byref(lock))
         if died or os.read(0, 1) == b"":
             os.write(port, message)
-            time.sleep(PASSED_ON)
-
-
-def _schedule(process: int, priority: int) -> None:
-    os.sched_setscheduler(process, os.SCHED_FIFO, os.sched_param(priority))
+            time.sleep(0.05)  # workers pass it on before they have the normal priority again
 
 
 @contextmanager
@@ -50,12 +43,12 @@ def raise_workers(priority: int) -> Iterator[list[int]]:
     """Context in which the kernel's workers that belong to no core and had the normal priority have
     that one, as far as the user may; gives which."""
     raised = []
-    for name in os.listdir("/proc") if sys.platform == "linux" else ():
-        with suppress(ValueError, OSError), open(f"/proc/{int(name)}/comm") as file:
-            worker = int(name)
+    names = os.listdir("/proc") if sys.platform == "linux" else ()
+    for worker in map(int, filter(str.isdigit, names)):
+        with suppress(OSError), open(f"/proc/{worker}/comm") as file:
             normal = not (os.sched_getscheduler(worker) or os.getpriority(os.PRIO_PROCESS, worker))
             if file.read().startswith("kworker/u") and normal:
-                _schedule(worker, priority)
+                os.sched_setscheduler(worker, os.SCHED_FIFO, os.sched_param(priority))
                 raised.append(worker)
     try:
         yield raised

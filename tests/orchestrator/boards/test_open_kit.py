@@ -74,7 +74,6 @@ def test_the_watchdog_takes_the_torque_away(watchdog: bool) -> None:
     assert any(board.torques)
     board.at(1.0 + WATCHDOG + 1e-4)
     assert any(board.torques) != watchdog
-    assert board.tripped == watchdog
     assert WATCHDOG <= 0.05
 
 
