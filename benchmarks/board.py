@@ -284,8 +284,10 @@ def _injected(how: How, delay: float, room: Path) -> tuple[float, Log]:
             options = ["-m", "hapticlink", "run", str(path), "--real-time", "--no-figures"]
             options += ["--set", f"duration={duration:g}", "--out", str(room / "run")]
         with subprocess.Popen(
-            [sys.executable, *options], stdin=terminal, stdout=PIPE, stderr=PIPE, text=True
-        ) as process:
+            [sys.executable, *options], stdin=terminal, stdout=PIPE, stderr=PIPE, text=True,
+            # As in a terminal: what a shell has in the background would ignore it.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        ) as process:  # fmt: skip
             os.close(terminal)
             assert process.stdout
             if isinstance(how, str):
