@@ -30,9 +30,11 @@ from hapticlink.orchestrator.results.read_results import (
     without_rows,
 )
 from hapticlink.orchestrator.results.read_results import load as read_tables
+from hapticlink.orchestrator.run.compiled.loop import CompiledLoop
 from hapticlink.orchestrator.run.real_time import Ended, RealTimeRun
 from hapticlink.orchestrator.run.recorded_arrivals import RecordedArrivals
 from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, read_save_times
+from hapticlink.orchestrator.run.simulation import Simulation
 from hapticlink.orchestrator.scene.overrides import Options, write_options
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization import figure_files
@@ -55,7 +57,8 @@ def with_board(port: str | None) -> dict[str, Any]:
 
 
 def _ending(stop: Callable[[], bool]) -> Callable[..., None]:
-    def turn(*_: object) -> None:
+    def turn(_: Simulation, loop: CompiledLoop) -> None:
+        loop.events.patience(0)  # a turn after each event: a hand may wait for it
         if stop():
             raise Ended("stopped")
 
@@ -93,9 +96,9 @@ def run(
     (docs/real-time.md), at `speed` times that of the clock, less than 1 for slow motion. `arrivals`
     is the folder of a run in real time, whose samples arrive here when they arrived there. `device`
     is the port of the board in the place of the simulated device (docs/your-device.md); `stop` is
-    asked about every 20 ms whether the run in real time is to end, and `ready` is told what to do
-    with the handle of a board that has a `home`, and returns when it is done. `remote` has the
-    addresses HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other
+    asked at every tick whether the run in real time is to end, and `ready` is told what to do with
+    the handle of a board that has a `home`, and returns when it is done. `remote` has the addresses
+    HOST:PORT of FMUs, or of all FMUs at a rate, that `hapticlink serve` serves on other
     computers, and `key` is the file of the key of both (docs/two-computers.md). `save`: when the
     state of the run is saved to `out`, at times (s), at its "end", or every so many seconds,
     "every=0.5" (docs/resume.md); a scene goes on from one as its key `resume` says, and a state is

@@ -1,24 +1,30 @@
 """A board in the loop: ticks missed, what the bytes wait for, and how long motors keep a torque
 after a run has ended, was interrupted, was at fault, or was killed.
 
-The board is the simulated one, a process behind a socket that writes down when its motors change,
-by the same clock. In each injection a run has had torques for a random time when it is ended; that
-it is seen to end is the board's own last row, without torque. A run that ends before, as on a
-machine that stops it, is counted and made once more.
+The board is the simulated one, a process on a pseudo-terminal that writes down when its motors
+change, by the same clock. In each injection a run has had torques for a random time when it is
+ended; that it is seen to end is the board's own last row, without torque. A run that ends before,
+as on a machine that stops it, is counted and made once more.
 """
 
 from __future__ import annotations
 
 import csv
+import json
 import math
+import os
 import random
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import product
 from pathlib import Path
 from statistics import median
+from subprocess import PIPE
 
 from benchmarks import cyclictest
 from benchmarks.page import Progress, load_average, system, table
@@ -29,10 +35,9 @@ from hapticlink.orchestrator.base.signal_names import DEVICE
 from hapticlink.orchestrator.base.temporary_folders import temporary_folder
 from hapticlink.orchestrator.boards.driver import SIMULATED_BOARD
 from hapticlink.orchestrator.boards.simulated_board import WATCHDOG
-from hapticlink.orchestrator.experiment import simulate
+from hapticlink.orchestrator.boards.zero_torque_when_killed import WORKERS_PRIORITY
 from hapticlink.orchestrator.results.numbers import short
-from hapticlink.orchestrator.run.real_time import RealTimeRun
-from hapticlink.orchestrator.run.real_time_priority import PRIORITY
+from hapticlink.orchestrator.run.real_time_priority import PRIORITY, raise_beside
 from hapticlink.orchestrator.scene.overrides import toml
 from hapticlink.orchestrator.system.build_system import build_system
 
@@ -50,16 +55,15 @@ Rowed = Sequence[Mapping[str, str]]
 def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes ticks.csv, ways.csv and rests.csv into `folder`; rows that are there are kept."""
     seconds, times = (QUICK_SECONDS, QUICK_TIMES) if quick else (SECONDS, TIMES)
-    ticks = Rows(folder / "ticks.csv", TICKS, 1)
-    for rate in RATES:
-        if (rate,) not in ticks:
-            ticks.add(rate, *_long_run(rate, seconds, progress))
+    ticks = Rows(folder / "ticks.csv", TICKS, 2)
+    for rate, workers in product(RATES, WORKERS):
+        if (rate, workers) not in ticks:
+            ticks.add(rate, workers, *_long_run(rate, workers, seconds, progress))
     ways = Rows(folder / "ways.csv", WAYS, 2)
-    for number in range(2 if quick else BLOCKS):
-        for way in ("socket", "pseudo-terminal"):
-            progress(way, number, BLOCKS)
-            if (way, number) not in ways:
-                ways.add(way, number, *_round_trips(way))
+    for number, way in product(range(2 if quick else BLOCKS), WAYS_OF_BYTES):
+        progress(way, number, BLOCKS)
+        if (way, number) not in ways:
+            ways.add(way, number, *_round_trips(way))
     rests, draw = Rows(folder / "rests.csv", RESTS, 2), random.Random(SEED)
     for number in range(times):
         for i, rule in enumerate(RULES):
@@ -74,26 +78,38 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
 # --- ticks ----------------------------------------------------------------------------------
 
 TICKS = (
-    *("rate", "ticks", "missed", "skipped", "p50", "p99", "max", "ended", "scheduler", "load"),
-    *("wakings", "woken_late", "latest"),
+    *("rate", "workers", "ticks", "missed", "skipped", "p50", "p99", "max", "ended", "scheduler"),
+    *("told", "load", "wakings", "woken_late", "latest"),
 )
-"""Of a long run: step times (ms), and how late cyclictest woke beside it: the number of wakings,
-of those that were later than a period, and the latest (ms)."""
+"""Of a long run: step times (ms), what it says of the kernel's workers, and how late cyclictest
+woke beside it: the number of wakings, of those that were later than a period, and the latest
+(ms)."""
+WORKERS: Mapping[str, Sequence[str]] = {
+    "raised": (),
+    "normal": ("chrt", "-f", str(PRIORITY), "setpriv", "--bounding-set=-sys_nice"),
+}
+"""The kernel's workers that pass the bytes on, and what a run is started by: the second one is a
+user's who may raise his own priority alone."""
 
 
-def _long_run(rate: int, seconds: int, progress: Progress) -> Iterator[object]:
+def _long_run(rate: int, workers: str, seconds: int, progress: Progress) -> Iterator[object]:
     """What became of the ticks of a long run."""
-    options = OPTIONS | {"duration": seconds, "haptics.rate": rate}
+    keys = {"packaging": "native", "duration": seconds, "haptics.rate": rate}
+    changes = (f"--set={key}={value}" for key, value in keys.items())
     with temporary_folder() as room, cyclictest.beside(rate, PRIORITY) as latencies:
-        ended = simulate(
-            SCENE, room, options, lambda t: progress(f"{rate} Hz", int(t), seconds),
-            real_time=RealTimeRun(),
-        )  # fmt: skip
-        load = load_average()
-    told = ended.run["real_time"]
+        options = ("--real-time", "--no-figures", "--quiet", "--device", SIMULATED_BOARD)
+        command = [sys.executable, "-m", "hapticlink", "run", SCENE, *options, *changes]
+        begun = time.monotonic()
+        with subprocess.Popen([*WORKERS[workers], *command, "--out", str(room / "run")]) as process:
+            while process.poll() is None:
+                progress(f"{rate} Hz", int(time.monotonic() - begun), seconds)
+                time.sleep(0.5)
+        load, said = load_average(), json.loads((room / "run" / "run.json").read_text())
+    told = said["real_time"]
     yield from (told["ticks"], told["deadlines_missed"], told["skipped"])
     yield from (1e3 * told["step_time"][k] for k in ("p50", "p99", "max"))
-    yield from (ended.outcome.fault or "duration", told["priority"]["scheduler"], round(load, 1))
+    yield said["fault"]["message"] if said["fault"] else said["end"]["reason"]
+    yield from (told["priority"]["scheduler"], told["priority"]["workers"], round(load, 1))
     for woken in latencies:
         yield from (woken.wakings, woken.later_than(1 / rate), 1e-3 * woken.largest)
     if not latencies:
@@ -106,9 +122,12 @@ WAYS, BLOCKS = ("way", "number", "trips", "p50", "p99", "max", "long"), 5
 """Of blocks of round trips of a message between two processes of the loop's priority: times (ms),
 and how many took longer than LONG."""
 TRIPS, LONG = 3000, 1 / 512
+RAISED = "pseudo-terminal, workers raised"
+WAYS_OF_BYTES = ("socket", "pseudo-terminal", RAISED)
 ROUND_TRIPS = """
 import os, select, socket, sys, time, tty
-way, trips, rate, priority = sys.argv[1], *map(int, sys.argv[2:])
+from hapticlink.orchestrator.boards.stand_by import raise_workers
+way, trips, rate, priority, workers = sys.argv[1], *map(int, sys.argv[2:])
 if way == "socket":
     server = socket.create_server(("127.0.0.1", 0))
     ends = [socket.create_connection(server.getsockname()), server.accept()[0]]
@@ -129,21 +148,28 @@ while not child:
     os.write(board, message)
     if message[:1] == b"e":
         os._exit(0)
-begun = time.perf_counter()
-for k in range(trips):
-    if (left := begun + k / rate - time.perf_counter()) > 0:
-        time.sleep(left)
-    sent, size = time.perf_counter(), 0
-    os.write(host, (b"e" if k == trips - 1 else b"t") * 18)
-    while size < 18:
-        select.select([host], [], [])
-        size += len(os.read(host, 18))
-    print(time.perf_counter() - sent)
+def ask():
+    begun = time.perf_counter()
+    for k in range(trips):
+        if (left := begun + k / rate - time.perf_counter()) > 0:
+            time.sleep(left)
+        sent, size = time.perf_counter(), 0
+        os.write(host, (b"e" if k == trips - 1 else b"t") * 18)
+        while size < 18:
+            select.select([host], [], [])
+            size += len(os.read(host, 18))
+        print(time.perf_counter() - sent)
+if workers:
+    with raise_workers(workers):
+        ask()
+else:
+    ask()
 """
 
 
 def _round_trips(way: str) -> Iterator[object]:
-    command = [sys.executable, "-c", ROUND_TRIPS, way, str(TRIPS), "512", str(PRIORITY)]
+    numbers = map(str, (TRIPS, 512, PRIORITY, WORKERS_PRIORITY if way == RAISED else 0))
+    command = [sys.executable, "-c", ROUND_TRIPS, way, *numbers]
     said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     taken = sorted(map(float, said.split()))
     yield len(taken)
@@ -188,8 +214,11 @@ tell(1e-9 * real_time.pace.c.origin + duration)
 """
 """A run that says when it was ended, by the monotonic clock (s): when the fault was that is put
 into it, or when its last tick was due."""
-RULES: Mapping[str, str | signal.Signals] = {
+KEY = b" "
+How = str | bytes | signal.Signals
+RULES: Mapping[str, How] = {
     "end of the run": "",
+    "a key": KEY,
     "Ctrl-C (SIGINT)": signal.SIGINT,
     "SIGTERM": signal.SIGTERM,
     "torque that is not finite": """
@@ -214,7 +243,7 @@ OpenKit.receive = deaf
     "killed (SIGKILL): process that stands by": signal.SIGKILL,
     "stopped (SIGSTOP): watchdog of the board": signal.SIGSTOP,
 }
-"""How runs are ended: a signal, or what is put into their program."""
+"""How runs are ended: a signal, a key of the terminal, or what is put into their program."""
 
 
 def _rest(rule: str, delay: float) -> tuple[float, int, float, float]:
@@ -232,10 +261,9 @@ def _rest(rule: str, delay: float) -> tuple[float, int, float, float]:
     raise AssertionError(f"{rule}: no run came to its end: the machine is too busy")
 
 
-def _injected(how: str | signal.Signals, delay: float, room: Path) -> tuple[float, Log]:
+def _injected(how: How, delay: float, room: Path) -> tuple[float, Log]:
     """When a run was ended by the monotonic clock (s), and the rows of the board's log: times and
     torques."""
-    snippet = "" if isinstance(how, signal.Signals) else how
     duration = 10.0 if how else ENDS
     scene = open_scene.load(SCENE, OPTIONS | {"duration": duration})
     log, path = room / "board.csv", room / "scene.toml"
@@ -248,23 +276,44 @@ def _injected(how: str | signal.Signals, delay: float, room: Path) -> tuple[floa
         keys = OPTIONS | {"device.driver.port": driver.port}
         text = "".join(f"{key} = {toml(value, key)}\n" for key, value in keys.items())
         path.write_text(f'extends = "{SCENE}"\n{text}')
-        program = PROGRAM.replace("INJECTION", snippet)
-        given = map(str, (path, room / "run", delay, duration))
-        command = [sys.executable, "-c", program, *given]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        keyboard, terminal = os.openpty()
+        if isinstance(how, str):
+            program = PROGRAM.replace("INJECTION", how)
+            options = ["-c", program, *map(str, (path, room / "run", delay, duration))]
+        else:
+            options = ["-m", "hapticlink", "run", str(path), "--real-time", "--no-figures"]
+            options += ["--set", f"duration={duration:g}", "--out", str(room / "run")]
+        with subprocess.Popen(
+            [sys.executable, *options], stdin=terminal, stdout=PIPE, stderr=PIPE, text=True,
+            # As in a terminal: what a shell has in the background would ignore it.
+            preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        ) as process:  # fmt: skip
+            os.close(terminal)
             assert process.stdout
-            if isinstance(how, signal.Signals):
+            if isinstance(how, str):
+                since = float(process.stdout.readline() or "nan")
+                process.communicate()
+            else:
                 while process.poll() is None and not any(any(row[1:]) for row in _read(log)):
                     time.sleep(0.01)
                 time.sleep(delay)
-                since = time.monotonic()
-                process.send_signal(how)
+                press, kill = partial(os.write, keyboard), process.send_signal
+                act = partial(press, how) if isinstance(how, bytes) else partial(kill, how)
+                with ThreadPoolExecutor(1) as thread:
+                    since = thread.submit(_strike, act).result()
                 time.sleep(3 * WATCHDOG)
                 process.kill()
-            else:
-                since = float(process.stdout.readline() or "nan")
-                process.wait()
+        os.close(keyboard)
         return since, _read(log)
+
+
+def _strike(act: Callable[[], object]) -> float:
+    """When something was done, by the monotonic clock (s): with a priority at which the machine
+    does not stop this thread in between."""
+    raise_beside()
+    since = time.monotonic()
+    act()
+    return since
 
 
 Log = list[list[float]]
@@ -281,20 +330,20 @@ def _read(log: Path) -> Log:
 def page(ticks: Rowed, ways: Rowed, rests: Rowed, seconds: int, command: str) -> str:
     """The page: ticks missed by rate, round trips by way, and times to rest by how a run ends."""
     heads = (
-        "rate (Hz) | ticks | missed | share (%) | skipped | step time p50 | p99 | max | ended by | "
-        "load | cyclictest later than a period | latest"
+        "rate (Hz) | kernel's workers | ticks | missed | share (%) | skipped | step time p50 | "
+        "p99 | max | ended by | load | cyclictest later than a period | latest"
     )
     missed = (
         (
-            *(r["rate"], r["ticks"], r["missed"], _share(r["missed"], r["ticks"]), r["skipped"]),
-            *(short(float(r[key])) for key in ("p50", "p99", "max")),
+            *(r["rate"], r["told"], r["ticks"], r["missed"], _share(r["missed"], r["ticks"])),
+            *(r["skipped"], *(short(float(r[key])) for key in ("p50", "p99", "max"))),
             *(r["ended"], r["load"], f"{r['woken_late']} of {r['wakings']}"),
             short(float(r["latest"] or "nan")),
         )
         for r in ticks
     )
     trips = []
-    for way in dict.fromkeys(r["way"] for r in ways):
+    for way in WAYS_OF_BYTES:
         blocks = [r for r in ways if r["way"] == way]
         long, every = (sum(int(r[k]) for r in blocks) for k in ("long", "trips"))
         middle = (short(median(float(r[k]) for r in blocks)) for k in ("p50", "p99"))
@@ -315,19 +364,23 @@ def page(ticks: Rowed, ways: Rowed, rests: Rowed, seconds: int, command: str) ->
         "# A board in the loop",
         "",
         f"`{SCENE}` with native FMUs and the [simulated board](../../docs/your-device.md), a "
-        f"process behind a socket. Made by `{command}`, on {system()}; the loop's scheduler: "
+        f"process on a pseudo-terminal. Made by `{command}`, on {system()}; the loop's scheduler: "
         f"{ticks[0]['scheduler']}, and so the board's. Milliseconds.",
+        "",
+        "The bytes of a pseudo-terminal, as those of a serial port, are passed on by workers of "
+        "the kernel, which have the normal priority: on a busy machine they wait for others. A run "
+        "with a board raises them where its user may (root, or CAP_SYS_NICE). Without that right, "
+        "as a user whose `ulimit -r` lets him raise the loop alone, a real board at a serial port "
+        "meets the rows `normal`; a board behind a network does not depend on them.",
         "",
         f"Ticks of {seconds} s that were complete after the next was due, or were skipped, and how "
         "`cyclictest` of the same rate and priority woke in the same time. Load: the average of "
         "the minute at the end, with the run itself.",
         "",
-        *table(heads, "rrrrrrrrlrrr", missed),
+        *table(heads, "rlrrrrrrrlrrr", missed),
         "",
         f"Round trips of 18 bytes between two processes of that priority, {TRIPS} in a block at "
-        "512 Hz, blocks of both ways in turns (p50, p99: medians of blocks). The bytes of a "
-        "pseudo-terminal, as those of a serial port, are passed on by workers of the kernel that "
-        "have the normal priority: on a loaded machine they wait for others.",
+        "512 Hz, blocks of the ways in turns (p50, p99: medians of blocks).",
         "",
         *table(trip_heads, "lrrrrrr", trips),
         "",

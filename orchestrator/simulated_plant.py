@@ -1,13 +1,11 @@
-"""The process of a simulated board: its firmware behind a socket, with the device and the hand of a
-scene, which go on with the clock of this computer.
+"""The process of a simulated board: its firmware on a pseudo-terminal, with the device and the hand
+of a scene, which go on with the clock of this computer.
 
     python -m hapticlink.orchestrator.simulated_plant SCENE.json LOG WATCHDOG
 
-It prints the port for a driver, and ends when its standard input does. The bytes of a
-pseudo-terminal would wait for the kernel's workers, which have the normal priority
-(results/board). Until a run begins the hand keeps the device where the scene starts. LOG gets a
-row for each change of torques: the time (s, of the monotonic clock) and the torques (N.m) of the
-connectors. WATCHDOG is 1 or 0.
+It prints the name of its terminal, and ends when its standard input does. Until a run begins the
+hand keeps the device where the scene starts. LOG gets a row for each change of torques: the time
+(s, of the monotonic clock) and the torques (N.m) of the connectors. WATCHDOG is 1 or 0.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ import gc
 import json
 import os
 import select
-import socket
 import subprocess
 import sys
 import time
@@ -28,7 +25,7 @@ from typing import Any
 
 from hapticlink.components.specs.driver import Driver
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.signal_names import (
     DEVICE,
     HAND,
@@ -37,7 +34,7 @@ from hapticlink.orchestrator.base.signal_names import (
     MOTOR_TORQUES,
 )
 from hapticlink.orchestrator.base.temporary_folders import temporary_folder
-from hapticlink.orchestrator.boards.driver import SIMULATED_BOARD, SOCKET, Wiring
+from hapticlink.orchestrator.boards.driver import SIMULATED_BOARD, Wiring
 from hapticlink.orchestrator.boards.simulated_board import CONNECTORS, Firmware
 from hapticlink.orchestrator.fmi.worker_process import OWN_GROUP
 from hapticlink.orchestrator.run.initialize import initialize
@@ -70,12 +67,11 @@ class SimulatedPlant:
             for name in self._order
             if (incoming := system.into(name))
         }
-        device = system.fmu[DEVICE].description
         self._tau, self._q = (
             [fmus.signals.scalar(signal.partition(".")[0], s.name) for s in ports]
             for signal, ports in (
                 (MOTOR_TORQUES, system.fmu[MOTOR_MAP].description.port("tau", "output")),
-                (MOTOR_ANGLES, device.port("q_true", "output")),
+                (MOTOR_ANGLES, system.fmu[DEVICE].description.port("q_true", "output")),
             )
         )
         wiring = Wiring.of(
@@ -135,7 +131,7 @@ def simulated(tables: dict[str, Any]) -> Scene:
 def attach(
     scene: Scene, system: System, log: Path = Path(os.devnull), watchdog: bool = True
 ) -> Iterator[System]:
-    """The system, whose device that asks for a simulated board gets the port of one that is a
+    """The system, whose device that asks for a simulated board gets the terminal of one that is a
     process within the context. log, watchdog: of the process. Raises InputFault where there can be
     none."""
     asking = [u for u in system.fmus if u.driver and u.driver.port == SIMULATED_BOARD]
@@ -168,6 +164,8 @@ def attach(
 
 def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
     """Be the board until standard input ends."""
+    import tty  # not on Windows
+
     scene = simulated(tables)
     with ExitStack() as stack:
         system = stack.enter_context(build_system(scene))
@@ -175,40 +173,31 @@ def serve(tables: dict[str, Any], log: Path, watchdog: bool) -> None:
         plant = SimulatedPlant(scene, LoadedFmus(system, stack))
         board = Firmware(plant, watchdog, scene.device.torque_limit)
         rows = stack.enter_context(log.open("w", buffering=1))
-        listener = end = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
-        print(f"{SOCKET}127.0.0.1:{listener.getsockname()[1]}", flush=True)
+        board_end, host_end = os.openpty()  # which stays open where a host closes it
+        tty.setraw(host_end)
+        print(os.ttyname(host_end), flush=True)
         told: list[float] = []
         gc.disable()  # nothing below leaves cycles
         stack.enter_context(raise_priority())  # a board has a processor of its own
         while True:
-            ready, _, _ = select.select([end.fileno(), 0], [], [], 1 / RATE)
+            ready, _, _ = select.select([board_end, 0], [], [], 1 / RATE)
             if 0 in ready and not os.read(0, 1):
                 return
             now = time.monotonic()
-            if end.fileno() not in ready:
-                board.at(now)
-            elif end is listener:
-                end = stack.enter_context(listener.accept()[0])
-                end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            elif received := _received(end):
-                answer = board.take(received, now)
+            if board_end in ready:
+                answer = board.take(os.read(board_end, 4096), now)
                 if board.messages > 1:  # the first asks where the handle is
                     plant.begin(now)
-                end.sendall(answer)
+                os.write(board_end, answer)
             else:
-                end = listener
+                board.at(now)
             if board.torques != told:
                 told = [*board.torques]
                 rows.write(f"{now!r},{','.join(map(repr, told))}\n")
 
 
-def _received(end: socket.socket) -> bytes:
-    """The bytes that have come, none where the host is gone."""
-    try:
-        return end.recv(4096)
-    except ConnectionResetError:
-        return b""
-
-
 if __name__ == "__main__":
-    serve(json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), sys.argv[3] == "1")
+    try:
+        serve(json.loads(Path(sys.argv[1]).read_text()), Path(sys.argv[2]), sys.argv[3] == "1")
+    except Fault as fault:  # the device has diverged, or its FMUs have failed
+        sys.exit(f"{SIMULATED_BOARD} has ended: {fault}")

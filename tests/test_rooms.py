@@ -32,11 +32,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7505,
     "fmus": 2997,
-    "orchestrator": 16841,
+    "orchestrator": 16838,
     "programs": 1045,
-    "analysis": 9171,
-    "visualization": 3855,
-    "api": 640,
+    "analysis": 9172,
+    "visualization": 3856,
+    "api": 641,
     "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and

@@ -152,8 +152,10 @@ def modes(linear: Linearisation, period: float) -> list[Mode]:
     scale = linear.scales
     A, E = linear.A * scale / scale[:, None], np.abs(linear.E * scale / scale[:, None])
     E = np.maximum(E, FLOOR * np.abs(A))
-    values, left, right = eig(A, left=True, right=True)
-    upper = values.imag >= 0.0
+    # Beyond 1.5e138 SciPy's eigenvalues are those of the matrix that LAPACK has scaled.
+    size = 2.0 ** max(np.frexp(np.abs(A).max(initial=0.0))[1] - 400, 0)
+    values, left, right = eig(A / size, left=True, right=True)
+    upper, values = values.imag >= 0.0, size * values
     z, v, w = values[upper], right[:, upper], left[:, upper].conj()
     overlap = np.abs((w * v).sum(axis=0))
     apart = ((np.abs(w).T @ E).T * np.abs(v)).sum(axis=0)

@@ -58,11 +58,8 @@ def describe_board(description: Description) -> Description:
     """What a board has of a device that is described: inputs, parameters, and outputs that are
     measured. Raises ValueError for a device without them."""
     kept = [s for s in description.scalars if s.causality != "output" or s.port in MEASURED]
-    if missing := [
-        port
-        for port, of in ((TORQUES, "input"), *((name, "output") for name in MEASURED))
-        if not description.port(port, of)
-    ]:
+    needed = {TORQUES: "input", **dict.fromkeys(MEASURED, "output")}
+    if missing := [port for port, of in needed.items() if not description.port(port, of)]:
         raise ValueError(f"it has no {', '.join(missing)}")
     times = (Scalar(name, 0, "Real", "output", "s") for name in (SENT_AT, READ_AT))
     return replace(
@@ -79,19 +76,12 @@ def describe_board(description: Description) -> Description:
 class Board(Instance):
     """A board in the place of the FMU of a device, which is only asked for its angles at the start.
 
-    table: the device's [device.driver]. open_port: makes the driver of the wiring, by default that
-    of the table at its port.
+    table: the device's [device.driver].
     """
 
-    def __init__(
-        self,
-        table: Driver,
-        *arguments: Any,
-        open_port: Callable[[Wiring], DeviceDriver] | None = None,
-    ) -> None:
+    def __init__(self, table: Driver, *arguments: Any) -> None:
         super().__init__(*arguments)
         self._table = table
-        self._open_port = open_port or (lambda wiring: DRIVERS[table.type](table.port, wiring))
         outputs = self.description.outputs
         self._places = {
             name: [i for i, s in enumerate(outputs) if s.port == name]
@@ -101,7 +91,6 @@ class Board(Instance):
         self._torques = [0.0] * len(self._inputs)
         self._given: dict[Scalar, float] = {}
         """Parameters that connections set."""
-        self._connected: list[Callable[[Vector], None]] = []
         assert table.torque_limit
         assert table.torque_rate
         self.safe = SafeTorques(table.torque_limit, table.torque_rate, len(self._torques))
@@ -110,6 +99,8 @@ class Board(Instance):
         self._applied = self.safe.sent
         self._stepped = self._rests = False
         self._stack = ExitStack()
+        self.workers = "normal"
+        """The priority of the kernel's workers that pass on the bytes of a serial port."""
 
     # --- before the run -------------------------------------------------------------------
 
@@ -169,11 +160,11 @@ class Board(Instance):
         resolution = self._resolution()
         wiring = Wiring.of(self._table, len(self._torques), resolution, starts.tolist())
         self._turns = np.array([math.tau / counts for counts in wiring.counts])
-        driver = self._open_port(wiring)
+        driver = DRIVERS[self._table.type](self._table.port, wiring)
         try:
             self._open(driver)
             if words := driver.zero_torque_when_killed():
-                self._stack.enter_context(write_if_killed(*words))
+                self.workers = self._stack.enter_context(write_if_killed(*words))
         except (Silent, OSError) as error:
             raise self._fault(f"the board at {self._table.port} {_told(error)}", 0.0) from None
         self._driver = driver
@@ -281,11 +272,7 @@ class Board(Instance):
             with suppress(OSError):
                 self._driver.send(self.safe.rest())
 
-    def dismiss(self) -> None:
-        self.rest()
-
-    def abandon(self) -> None:
-        self.rest()
+    dismiss = abandon = rest
 
     def close(self) -> FmuFault | None:
         self.rest()

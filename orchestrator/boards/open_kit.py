@@ -85,7 +85,9 @@ class OpenKit(DeviceDriver):
             remedy = install_command("board")
             raise InputFault(f"{self.port}: serial ports need pyserial: {remedy}") from None
         try:
-            self._serial = serial_for_url(self.port, 115200, timeout=0, write_timeout=0.05)
+            self._serial = serial_for_url(
+                self.port, 115200, timeout=0, write_timeout=0.05, exclusive=True
+            )
             if self.port.startswith(SOCKET):
                 with socket.fromfd(
                     self._serial.fileno(), socket.AF_INET, socket.SOCK_STREAM

@@ -17,8 +17,6 @@ class SafeTorques:
         self._most, self._rate, self._none = most, rate, [0.0] * motors
         self.sent = self._none
         """The torques (N.m) that were sent last."""
-        self.limited = 0
-        """How often less was sent than asked for."""
 
     def limit(self, torques: Sequence[float], step: float) -> list[float]:
         """What to send a time `step` (s) after the torques before, of the `torques` (N.m) asked
@@ -31,7 +29,6 @@ class SafeTorques:
             most = min(self._most, grown + self._rate * step)
             if abs(asked) > most:
                 factor = min(factor, most / abs(asked))
-        self.limited += factor < 1.0
         self.sent = [factor * asked for asked in torques]
         return self.sent
 

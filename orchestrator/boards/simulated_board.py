@@ -1,4 +1,4 @@
-"""A board that is a process: the firmware of the open teaching kit behind a socket, with a
+"""A board that is a process: the firmware of the open teaching kit on a pseudo-terminal, with a
 device and a hand that are simulated beside it. It shares nothing with the driver of that protocol.
 
 `simulated_plant.py` has it in a process. The firmware is that of
@@ -45,8 +45,6 @@ class Firmware:
         self.angles = list(plant.advance(0.0, self.torques))
         self.messages = 0
         """Messages of torques since the set-up."""
-        self.tripped = 0
-        """How often the watchdog took a torque away."""
 
     def at(self, now: float) -> None:
         """What happens by a time (s) on its own: the device moves, the watchdog acts."""
@@ -54,7 +52,6 @@ class Firmware:
         if self._watchdog and expired <= now and any(self.torques):
             self.angles = list(self._plant.advance(expired, self.torques))
             self.torques = [0.0] * CONNECTORS
-            self.tripped += 1
         self.angles = list(self._plant.advance(now, self.torques))
 
     def take(self, received: bytes, now: float) -> bytes:

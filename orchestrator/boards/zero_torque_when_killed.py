@@ -1,10 +1,9 @@
 """A process that takes the torque off a board if this process is killed.
 
-It waits for a lock that this process holds, and then writes the message of zero torque to the
-board's port. On Linux the lock is a mutex that the kernel releases first of all when a thread dies
-(robust, pthread_mutexattr_setrobust(3)): the end of a pipe comes only once all memory is given
-back, which took some 30 ms, and stands in where there are none. The process needs the
-standard library alone, so that it is there within some hundredths of a second.
+It (`stand_by.py`) waits for a lock that this process holds, and then writes the message of zero
+torque to the board's port. On Linux the lock is a mutex that the kernel releases first of all when
+a thread dies (robust, pthread_mutexattr_setrobust(3)): the end of a pipe comes only once all memory
+is given back, which took some 30 ms, and stands in where there are none.
 """
 
 from __future__ import annotations
@@ -17,36 +16,24 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 
-_CODE = """
-import ctypes, mmap, os, signal, sys
-for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-    signal.signal(number, signal.SIG_IGN)
-try:
-    os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(PRIORITY))
-except (AttributeError, OSError):
-    pass
-port, shared, message = int(sys.argv[1]), int(sys.argv[2]), bytes.fromhex(sys.argv[3])
-lock = ctypes.c_char.from_buffer(mmap.mmap(shared, 0)) if shared >= 0 else 0
-os.write(1, b"1")
-died = lock and ctypes.pythonapi.pthread_mutex_lock(ctypes.byref(lock))
-if died or os.read(0, 1) == b"":
-    os.write(port, message)
-"""
-PRIORITY = 21
-"""Of that process, above that of the haptic loop, where the user may."""
+from hapticlink.orchestrator.boards import stand_by
+
+WORKERS_PRIORITY = 19
+"""Priority of the kernel's workers, below that of the haptic loop, where the user may."""
 _SIZE = 256
 """Bytes of a mutex or of its attributes, and more."""
 _SHARED, _ROBUST = 1, 1  # PTHREAD_PROCESS_SHARED, PTHREAD_MUTEX_ROBUST
 
 
 @contextmanager
-def write_if_killed(port: int, message: bytes) -> Iterator[None]:
+def write_if_killed(port: int, message: bytes) -> Iterator[str]:
     """Context in which a process stands by that writes `message` to the file descriptor `port` once
-    this process, or the thread that has entered the context, has ended within it. POSIX only."""
-    code = _CODE.replace("PRIORITY", str(PRIORITY))
+    this process, or the thread that has entered the context, has ended within it. Gives
+    the priority of the kernel's workers that pass on the bytes of a serial port. POSIX only."""
     shared, release = _hold_mutex()
+    numbers = map(str, (port, shared, WORKERS_PRIORITY))
     with subprocess.Popen(
-        [sys.executable, "-I", "-S", "-c", code, str(port), str(shared), message.hex()],
+        [sys.executable, "-I", "-S", stand_by.__file__, *numbers, message.hex()],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         pass_fds=(port, shared) if shared >= 0 else (port,),
@@ -54,9 +41,9 @@ def write_if_killed(port: int, message: bytes) -> Iterator[None]:
     ) as process:
         assert process.stdin
         assert process.stdout
-        os.read(process.stdout.fileno(), 1)
+        workers = process.stdout.readline().decode().strip()
         try:
-            yield
+            yield workers
         finally:
             with suppress(OSError):
                 process.stdin.write(b"0")

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from hapticlink.components.specs.quantities import Quantity
 from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.boards.board import Board
 from hapticlink.orchestrator.fmi.description import VARIABLE_STEP
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
@@ -122,6 +123,8 @@ class RealTimeRun:
     def report(self) -> dict[str, Any]:
         simulation = self._simulation
         haptics = simulation.system.timeline.clocks[0]
+        for board in (i for i in simulation.instances.values() if isinstance(i, Board)):
+            self.pace.priority["workers"] = board.workers
         return self.pace.report() | {
             "period": simulation.seconds(haptics.longest),
             "beside": dict(simulation.beside),

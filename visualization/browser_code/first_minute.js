@@ -19,13 +19,13 @@ export function firstMinute(controls) {
   return { rate, rates, softer: scaled(controls, SOFTER), about };
 }
 
-// What is said of the handle, and in which light: of its vibration, the hand's force, whether it was watched for long
-// enough, and whether the run has ended.
+// What is said of the handle, and in which light: of its vibration, the hand's force (none of one that holds a board), whether it
+// was watched for long enough, and whether the run has ended.
 export function felt(vibration, force, watched, ended) {
   if (DIVERGED.test(ended)) return ["The motion grew beyond all bounds: see the slow motion. Then it begins anew.", "red"];
   if (ended) return ["The run has ended: the line above the picture says why.", "red"];
   if (vibration) return [`The handle vibrates (red trace): ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
-  if (!force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
+  if (force && !force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
   if (!watched) return ["A second is watched first.", ""];
   return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
 }

@@ -51,11 +51,13 @@ const HANDLERS = {
     view.kinds = message.kinds;
     const runs = message.runs ?? 1;
     energies = Array.from({ length: runs }, () => new Energies(message));
-    charts.begin([{ name: message.port, words: message.port }, ...message.power], message.users, stage.view.dimension, runs);
+    const port = message.boards ? [] : [{ name: message.port, words: message.port }];
+    charts.begin([...port, ...message.power], message.users, stage.view.dimension, runs);
     ending.begin();
     view.start = view.frame = null;
     view.levels = [];
     view.marks = message.marks;
+    document.body.classList.toggle("boards", Boolean(message.boards)); // whoever holds one is the hand
     if (run.listen) view.sound = sound ??= new Sound(run.listen, message.haptics);
   },
   controls(message) {

@@ -12,6 +12,7 @@ from hapticlink.analysis.findings import labels
 from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.dynamics.assembly import start_coordinates
 from hapticlink.orchestrator.base.signal_names import DEVICE, HAND, PASS_ON
+from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Connection, System
 from hapticlink.visualization.live_and_standalone.offered_controls import users
@@ -42,13 +43,14 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
 
 
 def describe_viewed_run(scene: Scene, system: System, meters: Iterable[str]) -> dict[str, Any]:
-    """`users` by point, the rate of the `haptics` (Hz), and `power`, one entry for each connection
-    with an energy meter."""
+    """`users` by point, whether `boards` are held by some, the rate of the `haptics` (Hz), and
+    `power`, one entry for each connection with an energy meter."""
     timeline = system.timeline
     return {
         "type": "scene",
         "title": scene.title,
         "users": [*users(scene)],
+        "boards": any(driver_of(scene, user) for user in scene.all_devices),
         "haptics": float(1 / (timeline.clocks[0].longest * timeline.base)),
         "power": describe_power(system, meters),
     }

@@ -55,3 +55,13 @@ def test_eigenvalues_that_coincide_are_as_uncertain_as_errors_move_them(
     assert abs(first.z) == pytest.approx(0.8, abs=1e-6)
     assert first.uncertainty == pytest.approx(np.sqrt(error), rel=0.25)
     assert verdict(abs(first.z), first.uncertainty) == said
+
+
+@pytest.mark.parametrize("exponent", [100, 150, 250])
+def test_growth_beyond_what_eigenvalues_of_lapack_reach(exponent: int) -> None:
+    """As of a vibration at half the haptic rate over a hyperperiod of half a second."""
+    A = np.array([[1.0, 2.0], [3.0, -(10.0**exponent)]])
+    none = np.zeros(2)
+    (first, *_) = modes(Linearisation(none, none, np.eye(2), A, 0.0 * A), 0.5)
+    assert first.growth == pytest.approx(exponent * np.log(10) / 0.5, rel=1e-12)
+    assert first.participation == pytest.approx([0.0, 1.0])

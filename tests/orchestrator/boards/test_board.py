@@ -292,6 +292,24 @@ def test_a_pause_leaves_no_torque(port):
     assert run.fault is None, run.fault
 
 
+def test_a_key_is_seen_within_a_tick(port):
+    """It is asked for at every tick, not every 20 ms."""
+    pressed: list[int] = []
+
+    def stop() -> bool:
+        away(port)
+        if any(port.torques[-1]) and port.firmware.messages > 30:
+            pressed.append(len(port.torques))
+        return bool(pressed)
+
+    asked: list[int] = []
+    run = hl.run("closed-loop", SCENE, real_time=True, stop=lambda: bool(asked.append(0) or stop()))
+    assert run.fault is None
+    assert run.record.end.reason == "stopped"
+    assert len(asked) >= len(run["observer.x"]) - 2
+    assert port.torques[pressed[0] :] == [[0.0] * 4] * 3
+
+
 def moving(port: Port) -> None:
     """A device whose handle is moved along a curve."""
 

@@ -74,7 +74,6 @@ def test_the_watchdog_takes_the_torque_away(watchdog: bool) -> None:
     assert any(board.torques)
     board.at(1.0 + WATCHDOG + 1e-4)
     assert any(board.torques) != watchdog
-    assert board.tripped == watchdog
     assert WATCHDOG <= 0.05
 
 
@@ -133,6 +132,9 @@ def test_a_port_of_this_computer(kind: str) -> None:
     thread.start()
     driver = OpenKit(port, TWO_MOTORS)
     driver.open()
+    if kind == "terminal":
+        with pytest.raises(OSError, match="exclusively lock port"):  # it has one host at a time
+            OpenKit(port, TWO_MOTORS).open()
     for torques in ([0.1, -0.05], [0.0, 0.0]):
         driver.send(torques)
         assert driver.receive(5.0) == [-90.0, 12.0]

@@ -50,6 +50,8 @@ def test_it_shows_the_measured_handle_and_the_mouse_pulls_at_nothing(port, tmp_p
     assert all(f["handle"] == f["measured"] for f in frames)
     assert all("F_hand" not in f for f in frames)
     assert not [m for m in link.sent if m["type"] == "refused"]
+    (about,) = (m for m in link.sent if m["type"] == "scene")
+    assert about["boards"]  # so that nobody is asked to drag, or told of the hand's energy
     (controls, *_) = (m["controls"] for m in link.sent if m["type"] == "controls")
     keys = {control["key"] for control in controls}
     assert "graphics.rate" in keys

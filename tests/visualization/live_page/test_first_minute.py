@@ -146,6 +146,8 @@ def test_it_is_steady_only_in_a_hand() -> None:
         "The run has ended": [None, hand, True, "the device left its workspace"],
         "The motion grew beyond all bounds": [swings, hand, True, "the run has diverged"],
     }
+    on_a_board = javascript("first_minute.js", told, [[None, None, True, None]])
+    assert on_a_board[0][0].startswith("The handle is steady")
     found = javascript("first_minute.js", told, [*said.values()])
     assert [words.split(":")[0] for words, _ in found] == [*said]
     assert [light for _, light in found] == ["", "", "green", "red", "red", "red"]
