@@ -3,7 +3,7 @@ runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from hapticlink.analysis.maps.boundary_lines import Line
 from hapticlink.analysis.sweep.grid import Axis, grid, number
 from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import Row
-from hapticlink.analysis.sweep.run_sweep import Judge, tabulate
+from hapticlink.analysis.sweep.run_sweep import Judge, Means, tabulate
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault
@@ -41,19 +41,17 @@ def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],
     axes: Sequence[Axis],
-    folder: Path,
-    processes: int,
+    means: Means,
     check: int = 0,
     seed: int = 0,
-    tell: Callable[[int, int], None] = lambda done, of: None,
 ) -> Map:
     """The map over `axes`: the first two of numbers are its plane, the others give panels. Along
     both keys, each pair of neighbours with different verdicts is followed to where the radius is
     1.
 
-    A line of points is kept in `folder`/rows when it is done, after which map.csv has it too; the
-    same call continues an interrupted map. Raises Unfinished if it is interrupted, InputFault
-    without an axis of numbers.
+    A line of points is kept in `rows` of the folder when it is done, after which map.csv has it
+    too; the same call continues an interrupted map. Raises Unfinished if it is interrupted,
+    InputFault without an axis of numbers.
     """
     numeric = [axis for axis in axes if _numeric(axis)]
     if not numeric:
@@ -67,16 +65,7 @@ def compute_map(
     panels = grid(others)
 
     def add(lines: Sequence[Line], judge: Judge, before: Sequence[Row]) -> list[Row]:
-        return tabulate(
-            lines,
-            folder,
-            judge,
-            processes,
-            tell=lambda done: tell(done, len(lines)),
-            before=before,
-            name="map.csv",
-            each_time=True,
-        )
+        return tabulate(lines, means, judge, before=before, name="map.csv", each_time=True)
 
     lines = [
         line

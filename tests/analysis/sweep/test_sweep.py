@@ -254,7 +254,7 @@ def test_native_fmus_that_are_there_are_taken_for_the_same_rows(
 
     def rows(cache: str) -> list[row.Row]:
         monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / cache))
-        found = run_sweep.sweep(made, tmp_path / f"{cache}-sweep", 1)
+        found = run_sweep.sweep(made, run_sweep.Means(tmp_path / f"{cache}-sweep"))
         return [{k: v for k, v in each.items() if k != "run_time_s"} for each in found]
 
     python = rows("python")
