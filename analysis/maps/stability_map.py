@@ -9,7 +9,7 @@ from pathlib import Path
 
 from hapticlink.analysis.maps import boundary_lines, run_checks
 from hapticlink.analysis.maps.boundary_lines import Line
-from hapticlink.analysis.sweep.grid import Axis, grid, number
+from hapticlink.analysis.sweep.grid import Axis, grid
 from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import Row
 from hapticlink.analysis.sweep.run_sweep import Judge, Means, tabulate
@@ -53,7 +53,7 @@ def compute_map(
     too; the same call continues an interrupted map. Raises Unfinished if it is interrupted,
     InputFault without an axis of numbers.
     """
-    numeric = [axis for axis in axes if _numeric(axis)]
+    numeric = [axis for axis in axes if axis.is_scale]
     if not numeric:
         raise InputFault(
             "--vary: no key has two numbers or more; give one or two such keys, e.g. "
@@ -81,7 +81,3 @@ def compute_map(
         rows = add(run_checks.jobs(scene, options, points), run_checks.judge, rows)
     first = open_scene.load(scene, options)
     return Map(first, rows, x.key, y.key if y else None, tuple(a.key for a in others))
-
-
-def _numeric(axis: Axis) -> bool:
-    return len(axis.values) > 1 and all(number(value) is not None for value in axis.values)

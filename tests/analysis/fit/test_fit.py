@@ -73,8 +73,8 @@ def test_a_device_of_which_every_start_is_wrong(log: Log) -> None:
     for estimate in estimates:
         assert abs(estimate.value - truth(estimate)) < max(
             5 * estimate.spread, 0.02 * truth(estimate)
-        ), estimate.line
-        assert estimate.spread < 0.2 * estimate.value, estimate.line
+        ), estimate.text
+        assert estimate.spread < 0.2 * estimate.value, estimate.text
     assert 0.25 < counts < 0.33
 
 
@@ -83,7 +83,7 @@ def test_an_arm_of_which_every_start_is_wrong(log: Log, start: dict[str, Any]) -
     estimates, unexplained = fit_arm(log, ArmHand(target=STILL, **start))
     assert len(estimates) == 15
     for estimate in estimates:
-        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
+        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.text
     assert max(unexplained) < 0.02
 
 

@@ -28,7 +28,7 @@ from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results, Table
-from hapticlink.orchestrator.results.run_record import Energy
+from hapticlink.orchestrator.results.run_record import ClockSteps, Energy
 from hapticlink.visualization.figures import sweep_figure
 from tests.little_fmus import slave
 from tests.orchestrator.results.records import run_json
@@ -155,6 +155,7 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
     }
     run = run_json(
         fmus=fmus,
+        clocks={name: asdict(ClockSteps(0.01, 0.01, 0.01)) for name in tables},
         holds={"a -> b": "zoh"},
         end={"reason": "stop_when", "time": 1.0},
         energies={"a -> b": asdict(Energy(0.25, 1.0, 0.75, 1.0, 0.5))},
