@@ -54,7 +54,8 @@ class InputSetter:
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Wait, set and draw as that did."""
-        self.values = saved["values"]
+        values = saved["values"]
+        self.values = None if values is None else np.array(values, np.float64)
         self._random.bit_generator.state = saved["drawn"]
         if saved["due"] is not None:
             self.wait(saved["due"])

@@ -202,9 +202,10 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         yield path, f"{value} should be a number, a text, true, false, a list or a table"
 
 
-def _is_unicode(text: str) -> bool:
+def _is_unicode(text: Any) -> bool:
+    """False of what is no text, too, as a key of a state of a run may be that somebody changed."""
     try:
         text.encode()
-    except UnicodeEncodeError:
+    except (UnicodeEncodeError, AttributeError):
         return False
     return True
