@@ -103,7 +103,7 @@ class Wire:
     """Whether to convert between the units of the two ends."""
 
 
-RecordRate = Annotated[float, Quantity("Hz", gt=0, le=1_000_000)]
+RecordRate = Annotated[float, Quantity("Hz", ge=1e-5, le=1_000_000)]
 
 
 @dataclass(frozen=True, kw_only=True)
