@@ -188,7 +188,7 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         for key, inside in value.items():
             if not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
-            yield from find_unrepresentable(inside, (*path, key))
+            yield from find_unrepresentable(inside, (*path, str(key)))
     elif isinstance(value, list):
         for i, inside in enumerate(value):
             yield from find_unrepresentable(inside, (*path, i))

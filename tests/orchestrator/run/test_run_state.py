@@ -211,7 +211,7 @@ def forge(state, folder, old, new):
 @pytest.mark.parametrize("key", ["5", "null", '{"bytes": "YQ=="}', '{"tuple": [1, 2]}'])
 def test_a_key_of_a_changed_scene_that_is_no_text_is_refused(small, tmp_path, key):
     with pytest.raises(SceneFault, match="is no Unicode text"):
-        hl.run(forge(small, tmp_path, '["title", ', f'[{key}, 1], ["title", '))
+        hl.run(forge(small, tmp_path, '["title", ', f'[{key}, {{"table": [[7, 1]]}}], ["title", '))
 
 
 @pytest.mark.parametrize(
