@@ -188,7 +188,7 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
     elif isinstance(value, dict | list):
         of_table = isinstance(value, dict)
-        for key, inside in value.items() if of_table else enumerate(value):
+        for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
             if of_table and not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
             kind = type(inside)  # tells at once that most values are fine
