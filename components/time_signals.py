@@ -67,10 +67,12 @@ class TimeSignal(ABC):
 
 
 def check_rows(rows: Rows, name: str) -> NDArray[np.float64]:
-    """The rows as an array. Raises ValueError, with `name`, where there are none, for numbers that
-    are not finite and for times that do not increase."""
+    """The rows as an array. Raises ValueError, with `name`, where there are none, for rows of a
+    time alone, for numbers that are not finite and for times that do not increase."""
     if not rows:
         raise ValueError(f"`{name}`: the table has no rows; give at least one")
+    if len(rows[0]) < 2:
+        raise ValueError(f"`{name}`: a row has at least one value beside its time (s)")
     for i, row in enumerate(rows):
         if len(row) != len(rows[0]):
             raise ValueError(

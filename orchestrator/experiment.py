@@ -207,9 +207,9 @@ def _columns(system: System) -> dict[str, list[str]]:
 
 def _find_left_out(every: System, system: System) -> list[str]:
     """The outputs `fmu.port` of which an entry is not written in the rows of its rate."""
-    if (written := system.recording.outputs) is None:
+    if (written := system.recording.whole) is None:
         return []
-    rows = {*written}.difference(*(t.outputs for t in system.recording.slower.values()))
+    rows = {*written}
     outputs = ((u.name, s) for u in every.fmus for s in u.description.outputs)
     left_out = (f"{u}.{s.port}" for u, s in outputs if f"{u}.{s.name}" not in rows)
     return [*dict.fromkeys(left_out)]

@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7505,
     "fmus": 2997,
-    "orchestrator": 16838,
+    "orchestrator": 16839,
     "programs": 1045,
     "analysis": 9172,
     "visualization": 3856,

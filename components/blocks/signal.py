@@ -26,7 +26,7 @@ def signal(
     unless it has either a table or a formula, for what `paths.signal` and `formula.expression`
     refuse, and where there is not one unit for each value."""
     block, read = Block(), list[TimeSignal]()
-    if (table is None) == (formula is None):
+    if (table is None) == (not formula):
         raise ValueError("give a signal either a `table` or a `formula`")
     if table is None:
         texts = (formula,) if isinstance(formula, str) else formula or ()
@@ -35,8 +35,6 @@ def signal(
         read = [paths.signal(table, interpolation, "table")]
         y = read[0].value(block.t)
     size = y.numel()
-    if not size:
-        raise ValueError("a signal has at least one value beside its time")
     if units and len(units) != size:
         raise ValueError(f"{len(units)} `units` for {size} values: give one for each")
     shape = () if size == 1 else (size,)

@@ -31,7 +31,6 @@ _IN_C: dict[str, type[np.generic]] = {
 _BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
 
 _TEXTS = {0: b""}
-_NUMBERS = {b"": 0}
 _LOCK = threading.Lock()
 NUMBER = 6
 """Bytes of the number of a text, which a double holds exactly."""
@@ -136,15 +135,15 @@ def as_signal(scalar: Scalar, value: Given) -> float:
 
 def number_of(text: bytes) -> int:
     """The number of a text, by which it is known from now on."""
+    number = int.from_bytes(sha256(text).digest()[:NUMBER]) if text else 0
     with _LOCK:
-        if text not in _NUMBERS:
-            number = int.from_bytes(sha256(text).digest()[:NUMBER])
-            while _TEXTS.setdefault(number, text) != text:  # two in some 10^7 texts
-                number += 1
-            _NUMBERS[text] = number
+        while _TEXTS.get(number, text) != text:  # two in some 10^7 texts
+            number += 1
+        if number not in _TEXTS:
+            _TEXTS[number] = text
             for follower in _followers:
                 follower(number, text)
-        return _NUMBERS[text]
+    return number
 
 
 def known_texts() -> dict[int, bytes]:

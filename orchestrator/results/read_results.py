@@ -308,9 +308,9 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
                 why = f"its first column is {columns[0] if columns else ''!r}, not 'time'"
                 raise InputFault(f"{path}: line 1: {why}: run the scene again")
             if not (first := file.readline()):
-                return columns, np.zeros((0, len(columns))), {}
+                return columns, np.zeros((0, len(columns))), rows_file.NO_TEXTS
             # The text of all lines would take twice what they take.
-            lines, texts = chain([first], file), dict[int, dict[int, str]]()
+            lines, texts = chain([first], file), rows_file.NO_TEXTS
             if '"' in first:
                 values, texts = _read_texts(lines)
             else:
@@ -321,7 +321,7 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
         raise InputFault(f"{path}: {error.strerror}: run the scene again") from error
     except csv.Error as error:  # a line without end
         raise InputFault(f"{path}: {error}: run the scene again") from error
-    except ValueError as error:
+    except (IndexError, ValueError) as error:
         line = _find_malformed_line(path)
         raise InputFault(f"{path}: {line or error}: run the scene again") from error
     ordered = np.diff(values[:, 0], prepend=-math.inf) >= 0
@@ -332,19 +332,16 @@ def _read_csv(path: Path) -> tuple[tuple[str, ...], Vector, rows_file.Texts]:
     return columns, values, texts
 
 
-def _read_texts(lines: Iterator[str]) -> tuple[Vector, dict[int, dict[int, str]]]:
+def _read_texts(lines: Iterator[str]) -> tuple[Vector, rows_file.Texts]:
     """The numbers of rows in which texts are in quotes, each text counted as it comes."""
-    numbers: dict[int, dict[str, int]] = {}
-    rows = []
-    for cells in csv.reader(lines, quoting=csv.QUOTE_NONNUMERIC, strict=True):
-        row: list[Any] = cells
-        for place, cell in enumerate(cells):
-            if isinstance(cell, str):
-                known = numbers.setdefault(place, {})
-                row[place] = known.setdefault(cell, len(known))
-        rows.append(row)
-    texts = {place: {n: word for word, n in known.items()} for place, known in numbers.items()}
-    return np.array(rows, np.float64), texts
+    known: dict[str, int] = {}
+    rows: list[list[Any]] = [*csv.reader(lines, quoting=csv.QUOTE_NONNUMERIC, strict=True)]
+    places = [place for place, cell in enumerate(rows[0]) if isinstance(cell, str)]
+    for row in rows:
+        for place in places:
+            row[place] = known.setdefault(row[place], len(known))
+    words = {number: word for word, number in known.items()}
+    return np.array(rows, np.float64), dict.fromkeys(places, words)
 
 
 def _require_file(path: Path) -> None:

@@ -193,9 +193,10 @@ def _identify(file: FileIO) -> tuple[int, int]:
 
 Texts = Mapping[int, Mapping[int, str]]
 """By the place of a column that is a text, the texts of its numbers."""
+NO_TEXTS: Texts = MappingProxyType({})
 
 
-def text(rows: Rows, texts: Texts = MappingProxyType({})) -> bytes:
+def text(rows: Rows, texts: Texts = NO_TEXTS) -> bytes:
     """Rows as CSV, each number as the shortest text that reads back to the same float, each text in
     quotes."""
     # pydantic's JSON, [1.0,2.0], writes floats ten times faster than repr, and round-trips too.
@@ -220,7 +221,7 @@ def text_line(number: int, text: bytes) -> str:
 def read_texts(path: Path) -> Texts:
     """Of a file of texts; none where there is no such file. Its last line may be cut."""
     if not path.exists():
-        return {}
+        return NO_TEXTS
     types, *lines = path.read_text().splitlines(keepends=True)
     cells = (line.split(" ") for line in lines if line.endswith("\n"))
     known = {int(number): bytes.fromhex(text) for number, text in cells}

@@ -23,6 +23,10 @@ SUFFIX = ".state"
 _FIRST = "state of a run of hapticlink"
 LARGEST = 1 << 31
 """Bytes."""
+_MISREAD = (
+    LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RecursionError,
+    AssertionError,
+)  # fmt: skip
 
 
 def write_state(path: Path, content: Mapping[str, Any]) -> None:
@@ -53,15 +57,7 @@ def expect_state(path: Path) -> Iterator[None]:
     has made its checksum anew."""
     try:
         yield
-    except (
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        ArithmeticError,
-        RecursionError,
-        AssertionError,
-    ) as error:
+    except _MISREAD as error:
         raise InputFault(
             f"{path}: changed since it was saved, as its checksum was ({type(error).__name__}: "
             f"{shorten(str(error))}): save the state again"

@@ -54,7 +54,8 @@ class InputSetter:
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Wait, set and draw as that did."""
-        self.values = saved["values"]
+        values, size = saved["values"], len(self._change.inputs)
+        self.values = None if values is None else np.array(values, np.float64).reshape(size)
         self._random.bit_generator.state = saved["drawn"]
         if saved["due"] is not None:
             self.wait(saved["due"])

@@ -54,6 +54,7 @@ def read(path: Path) -> RunState:
     content = read_state(path)
     with expect_state(path):
         layout, version, _ = content["layout"], content["version"], float(content["time"])
+        content["rows"] = {table: int(count) for table, count in content["rows"].items()}
     if layout != _layout():
         raise InputFault(
             f"{path}: made by another version of hapticlink ({version}), whose states have other "
@@ -306,7 +307,7 @@ def _restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> Non
         if name in saved["checks"]:
             check.restore(saved["checks"][name])
     loop.operations.restore(dict(saved["iterations"]))
-    simulation.balance.begun = saved["balance"]
+    simulation.balance.begun = float(saved["balance"])
     loop.events.restore(saved["events"])
     for name in newer:
         _begin_hold(system.connection[name], simulation, loop)

@@ -79,12 +79,9 @@ class SignalVector:
 
     def recorded(self, table: str) -> dict[str, int] | None:
         """The columns `fmu.variable` of a table with their indices, None where there are none."""
-        slower = self.system.recording.slower
-        of, written = slower.get(table), self.system.recording.outputs
-        span = self.clock(of.clock if of else table)
-        if written and slower:
-            apart = of.outputs if of else frozenset().union(*(t.outputs for t in slower.values()))
-            written = tuple(n for n in written if (n in apart) == (of is not None))
+        recording = self.system.recording
+        of = recording.slower.get(table)
+        span, written = self.clock(of.clock if of else table), of.outputs if of else recording.whole
         names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
         columns = {n: i for n, i in names.items() if span.start <= i < span.stop}
         if written is None:

@@ -187,13 +187,14 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     if len(path) > DEEPEST:
         yield path, f"more than {DEEPEST} tables or lists within one another: write it flatter"
     elif isinstance(value, dict | list):
+        of_table = isinstance(value, dict)
         for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
-            if isinstance(key, str) and not _is_unicode(key):
+            if of_table and not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
             kind = type(inside)  # tells at once that most values are fine
             fine = kind is float or kind is bool or (kind is str and inside.isascii())
             if not fine or len(path) == DEEPEST:
-                yield from find_unrepresentable(inside, (*path, key))
+                yield from find_unrepresentable(inside, (*path, str(key) if of_table else key))
     elif isinstance(value, str):
         if not _is_unicode(value):
             yield path, f"{value[:100]!a} is no Unicode text: write it in UTF-8"
@@ -204,7 +205,8 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
         yield path, f"{value} should be a number, a text, true, false, a list or a table"
 
 
-def _is_unicode(text: str) -> bool:
-    with suppress(UnicodeEncodeError):
+def _is_unicode(text: Any) -> bool:
+    """False of what is no text, too, as a key of a state of a run may be that somebody changed."""
+    with suppress(UnicodeEncodeError, AttributeError):
         return text.isascii() or bool(text.encode())
     return False

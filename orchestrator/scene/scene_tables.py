@@ -107,7 +107,7 @@ class Wire:
         return f"{self.from_} -> {self.to}"
 
 
-RecordRate = Annotated[float, Quantity("Hz", gt=0, le=1_000_000)]
+RecordRate = Annotated[float, Quantity("Hz", ge=1e-5, le=1_000_000)]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -82,6 +82,8 @@ def with_signals(
         rows: list[list[Any]] | None = []
         with collect_problem(problems, ("connection", i, "from", "table")):
             rows = _read_texts(source)
+            if rows is not None and [w.get("to") for w in wires].count(target) > 1:
+                raise ValueError(f"{target} is fed by another [[connection]] already; keep one")
         if rows is not None:
             texts.add(i)
             first = len(events)
@@ -106,7 +108,7 @@ def with_signals(
 
 def _read_texts(source: Mapping[str, Any]) -> list[list[Any]] | None:
     """The rows (time, texts) of a table of texts; None of other signals. Raises as
-    `read_recorded_table` does, and ValueError for an interpolation that texts do not have."""
+    `read_recorded_table` does, and ValueError for a key that texts do not have."""
     table = source.get("table")
     rows: list[list[Any]] | None = None
     if isinstance(table, dict) and "path" in table:
@@ -115,8 +117,9 @@ def _read_texts(source: Mapping[str, Any]) -> list[list[Any]] | None:
         rows = table if any(isinstance(x, str) for row in table for x in row[1:]) else None
     if rows is None:
         return None
-    if (how := source.get("interpolation", "hold")) != "hold":
-        raise ValueError(f"interpolation = {how!r}: texts are held until the next: leave it out")
+    for key, value in source.items():
+        if key != "table" and (key, value) != ("interpolation", "hold"):
+            raise ValueError(f"{key} = {value!r}: texts are held until the next: leave it out")
     for k, row in enumerate(rows):
         if [*map(type, row[1:])] != [str] or type(row[0]) not in (int, float):
             raise ValueError(f"row {k + 1}, {row}: with texts a row is a time (s) and one text")

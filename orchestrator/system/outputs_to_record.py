@@ -7,10 +7,9 @@ import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from fractions import Fraction
+from itertools import chain
 
 from hapticlink.orchestrator.base.errors import near
-from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.fmi.variables import WRITTEN, Scalar
 from hapticlink.orchestrator.scene.scene_tables import RecordTable
 from hapticlink.orchestrator.scene.toml_keys import Problem
@@ -27,9 +26,8 @@ def read_recorded(fmu: Fmu, record: RecordTable, connections: Iterable[Connectio
     patterns = () if isinstance(record.signals, str) else record.signals
 
     def is_named(s: Scalar) -> bool:
-        names = (fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}")
-        named = any(_fits(pattern, names[s.causality != "output" :]) for pattern in patterns)
-        return named and not s.clocks and s.causality != "independent"
+        can_be = not s.clocks and s.causality != "independent"
+        return can_be and _find_pattern(patterns, fmu, s) is not None
 
     texts = {s.port for s in fmu.description.strings if is_named(s)}
     fmu = with_texts(fmu, connections, texts)
@@ -38,6 +36,17 @@ def read_recorded(fmu: Fmu, record: RecordTable, connections: Iterable[Connectio
         return fmu
     scalars = tuple(replace(s, recorded=s.name in asked) for s in fmu.description.scalars)
     return replace(fmu, description=replace(fmu.description, scalars=scalars))
+
+
+def _names(fmu: Fmu, s: Scalar) -> tuple[str, ...]:
+    """What a variable is called; all outputs of an FMU by its name, too."""
+    names = (fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}")
+    return names[s.causality != "output" :]
+
+
+def _find_pattern(patterns: Iterable[str], fmu: Fmu, s: Scalar) -> str | None:
+    """The first pattern that a variable fits."""
+    return next((pattern for pattern in patterns if _fits(pattern, _names(fmu, s))), None)
 
 
 def _fits(pattern: str, names: Iterable[str]) -> bool:
@@ -53,7 +62,7 @@ def choose_outputs(
     outputs; texts where a list names them. Adds a problem for each name that is none of an FMU, a
     port or a variable, and each pattern that fits none."""
     called = {
-        f"{fmu.name}.{s.name}": {fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}"}
+        f"{fmu.name}.{s.name}": _names(fmu, s)
         for fmu in system.fmus
         for s in fmu.description.outputs
         if s.type not in WRITTEN or not isinstance(record.signals, str)
@@ -66,58 +75,53 @@ def choose_outputs(
     elif record.signals == "connected":
         chosen = {f"{c.source}.{s.name}" for c in system.connections for s in c.outputs}
     else:
-        known = list(dict.fromkeys(name for names in called.values() for name in sorted(names)))
+        by_name = isinstance(record.signals, Mapping)
+        known = [*dict.fromkeys(chain(*called.values()))]
         chosen = {name for name in known if any(_fits(asked, [name]) for asked in record.signals)}
         problems += [
-            (("record", "signals", i), _why_nothing(name, system, known))
-            for i, name in _places(record.signals)
+            (("record", "signals", name if by_name else i), _why_nothing(name, system, known))
+            for i, name in enumerate(record.signals)
             if not _fits(name, known)
         ]
-    return tuple(name for name, names in called.items() if names & chosen)
+    return tuple(name for name, names in called.items() if chosen.intersection(names))
 
 
 def choose_slower(
     record: RecordTable, system: System, problems: list[Problem]
 ) -> dict[str, SlowerTable]:
     """The tables, `<clock>_<rate>hz`, of outputs with a rate of rows below that of their clock;
-    those with a higher one have its. Adds a problem for each that is no whole part of the
-    clock's."""
+    those with a higher one have its. Adds a problem for each that is, to six digits, no whole part
+    of the clock's."""
     tables: dict[str, SlowerTable] = {}
     told = set[tuple[str, str]]()
     asked = record.signals if isinstance(record.signals, Mapping) else {}
     for fmu in system.fmus:
         clock = system.timeline.clock(fmu.clock)
         for s in fmu.description.outputs if asked else ():
-            names = (fmu.name, f"{fmu.name}.{s.port}", f"{fmu.name}.{s.name}")
-            pattern = next((p for p in asked if _fits(p, names[s.causality != "output" :])), None)
-            if pattern is None or (pattern, clock.name) in told:
+            if (pattern := _find_pattern(asked, fmu, s)) is None or (pattern, clock.name) in told:
                 continue
-            rate = exact(asked[pattern])
-            own = 1 / (clock.period * system.timeline.base) if clock.period else None
-            if own is None or (own > rate and own % rate):
+            own = clock.period and float(1 / (clock.period * system.timeline.base))
+            every = max(round(own / asked[pattern]), 1) if own else 0
+            if not own or f"{own / every:g}" != f"{min(asked[pattern], own):g}":
                 told.add((pattern, clock.name))
-                why = _why_not_at(rate, clock.name, own)
+                why = _why_not_at(asked[pattern], clock.name, own)
                 problems.append((("record", "signals", pattern), why))
-            elif own > rate:
-                table = f"{clock.name}_{float(rate):g}hz"
-                others = tables[table].outputs if table in tables else frozenset[str]()
-                outputs = others | {f"{fmu.name}.{s.name}"}
-                tables[table] = SlowerTable(clock.name, int(own / rate), outputs)
+            elif every > 1:
+                table = f"{clock.name}_{own / every:g}hz"
+                before = tables[table].outputs if table in tables else ()
+                outputs = (*before, f"{fmu.name}.{s.name}")
+                tables[table] = SlowerTable(clock.name, every, outputs)
     return tables
 
 
-def _why_not_at(rate: Fraction, clock: str, own: Fraction | None) -> str:
-    if own is None:
-        return f"the rate of {clock} varies, of which {float(rate):g} Hz is no part: take `every`"
-    less, more = (float(own / n) for n in (math.ceil(own / rate), own // rate))
+def _why_not_at(rate: float, clock: str, own: float | None) -> str:
+    if not own:
+        return f"the rate of {clock} varies, of which {rate:g} Hz is no part: take `every`"
+    less, more = own / math.ceil(own / rate), own / math.floor(own / rate)
     return (
-        f"{float(rate):g} Hz is no whole part of the {float(own):g} Hz of {clock}, at whose "
-        f"communication points rows are: take {less:.6g} or {more:.6g}"
+        f"{rate:g} Hz is no whole part of the {own:g} Hz of {clock}, at whose communication points "
+        f"rows are: take {less:g} or {more:g}"
     )
-
-
-def _places(asked: Sequence[str] | Mapping[str, float]) -> Iterable[tuple[int | str, str]]:
-    return zip(asked, asked, strict=True) if isinstance(asked, Mapping) else enumerate(asked)
 
 
 def _why_nothing(name: str, system: System, known: Sequence[str]) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cached_property
+from itertools import chain
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -199,7 +200,7 @@ class SlowerTable:
 
     clock: str
     every: int
-    outputs: frozenset[str]
+    outputs: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -212,6 +213,12 @@ class Recording:
     """Number of communication points of a clock for which it gets a row."""
     slower: Mapping[str, SlowerTable] = field(default_factory=dict)
     """By name, the tables of outputs that have fewer rows, which are in no other."""
+
+    @property
+    def whole(self) -> tuple[str, ...] | None:
+        """The outputs that are in the tables of the clocks; None for all."""
+        apart = {*chain(*(t.outputs for t in self.slower.values()))}
+        return self.outputs and tuple(n for n in self.outputs if n not in apart)
 
     def tables(self, clock: str) -> dict[str, int]:
         """The names of a clock's tables, each with its `every`."""

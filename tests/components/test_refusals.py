@@ -70,6 +70,7 @@ REFUSED = [
     (lambda: Tableau(((), (0.5,)), (0.0, 1.0), (0.5,), 1), ValueError, "an explicit method has"),
     # signals
     (lambda: TimeTable((), "x"), ValueError, "`x`: the table has no rows"),
+    (lambda: TimeTable(((0.0,), (1.0,)), "x"), ValueError, "at least one value beside its time"),
     (lambda: TimeTable(((0.0, 1.0), (0.0, 2.0)), "x"), ValueError,
      r"`x`: row 2 at t = 0.0 s does not come after 0.0 s"),
     (lambda: TimeTable(((0.0, 1.0), (1.0, float("nan"))), "x"), ValueError,

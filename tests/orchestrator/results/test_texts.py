@@ -51,6 +51,15 @@ def test_a_text_is_in_the_table_and_read_back(tmp_path, kind):
     np.testing.assert_array_equal(read["says.y"], np.arange(33))
 
 
+@pytest.mark.parametrize("cut", ["0.6,1.0\n", '0.6,1.0,"a\n', '0.6,x,"a","b"\n'])
+def test_a_table_of_texts_with_a_line_that_is_none_is_refused(tmp_path, cut):
+    hl.run(says(tmp_path), out=tmp_path / "out", figures=False)
+    with (tmp_path / "out" / "haptics.csv").open("a") as table:
+        table.write(cut)
+    with pytest.raises(InputFault, match=r"haptics\.csv: .*: run the scene again"):
+        hl.load(tmp_path / "out")
+
+
 def test_another_run_leaves_no_texts_of_the_one_before(tmp_path):
     path = says(tmp_path)
     hl.run(path, {"record.format": "rows"}, out=tmp_path / "out", figures=False)
@@ -87,8 +96,7 @@ def test_a_run_with_texts_goes_on_from_its_state_to_the_same_bytes(tmp_path, mon
     says(tmp_path)
     path = scene(tmp_path, text)
     hl.run(path, out=tmp_path / "whole", figures=False, save=[0.28125])
-    for name, empty in (("_TEXTS", {0: b""}), ("_NUMBERS", {b"": 0})):
-        monkeypatch.setattr(transfer, name, empty)
+    monkeypatch.setattr(transfer, "_TEXTS", {0: b""})
     state = tmp_path / "whole" / "at-0.28125.state"
     hl.run(state, out=tmp_path / "later", figures=False)
     for name in ("haptics.csv", "16hz.csv"):

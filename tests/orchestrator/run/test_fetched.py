@@ -252,6 +252,14 @@ def test_each_signal_has_a_rate_of_rows_of_its_own(tmp_path, kind, every):
     assert "haptic_device.x" in found.record.not_recorded  # in every row of its rate
 
 
+@pytest.mark.parametrize(("rate", "every"), [(170.667, 3), (512 / 3, 3), (73.1429, 7)])
+def test_a_rate_is_taken_as_a_refusal_names_it(rate, every):
+    options = {"duration": 0.1, "record.signals": {"haptic_device.x": rate}}
+    found = hl.run("single-body", options, figures=False)
+    (table,) = (t for name, t in found.tables.items() if name.startswith("haptics_"))
+    np.testing.assert_array_equal(table["time"][:-1] * 512 / every, range(len(table["time"]) - 1))
+
+
 def test_what_has_fewer_rows_is_in_no_finding(tmp_path):
     """Beside positions of another time a handle would be far from its point."""
     rates = {"haptic_device.*": 64, "*": 512}
@@ -268,7 +276,8 @@ def test_what_has_fewer_rows_is_in_no_finding(tmp_path):
         ({"virtual_environment.q": 7}, {"graphics.rate": {"min": 20, "max": 30, "seed": 1}},
          "the rate of graphics varies, of which 7 Hz is no part"),
         ({"nobody.x": 64}, {}, "'nobody.x' is no FMU, nor variable of one"),
-        ({"haptic_device.x": 0}, {}, "0 is out of range: give a number > 0"),
+        ({"haptic_device.x": 170.6}, {}, "take 128 or 170.667"),
+        ({"haptic_device.x": 0}, {}, "0 is out of range: give a number >= 1e-05"),
     ],
 )  # fmt: skip
 def test_a_rate_that_rows_cannot_have_is_refused(signals, options, why):

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.errors import InputFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from hapticlink.orchestrator.holds import HOLDS, Hold
 from hapticlink.orchestrator.results.recover import recover
 from hapticlink.orchestrator.scene.find_scene import list_shipped
@@ -198,6 +198,22 @@ def test_a_file_that_is_no_state(small, tmp_path, change, why):
         hl.run(path)
 
 
+def forge(state, folder, old, new):
+    """The state with other content, and its checksum."""
+    first, _, body = state.read_text().split("\n", 2)
+    assert old in body
+    body = body.replace(old, new)
+    path = folder / "a.state"
+    path.write_text(f"{first}\n{hashlib.sha256(body.encode()).hexdigest()}\n{body}")
+    return path
+
+
+@pytest.mark.parametrize("key", ["5", "null", '{"bytes": "YQ=="}', '{"tuple": [1, 2]}'])
+def test_a_key_of_a_changed_scene_that_is_no_text_is_refused(small, tmp_path, key):
+    with pytest.raises(SceneFault, match="is no Unicode text"):
+        hl.run(forge(small, tmp_path, '["title", ', f'[{key}, {{"table": [[7, 1]]}}], ["title", '))
+
+
 @pytest.mark.parametrize(
     "change",
     [
@@ -207,13 +223,12 @@ def test_a_file_that_is_no_state(small, tmp_path, change, why):
         ('{"table": [', '{"table": 1, "rest": ['),
         ('"array": [', '"array": [1, '),
         ('{"table"', '"table"'),  # no JSON any more
+        ('["rows", ', '["rows", 1], ["other", '),
+        ('["balance", ', '["balance", {"tuple": []}], ["other", '),  # what is read much later
     ],
 )
 def test_content_that_was_changed_with_its_checksum_is_a_clear_error(small, tmp_path, change):
-    first, _, body = small.read_text().split("\n", 2)
-    body = body.replace(*change)
-    path = tmp_path / "a.state"
-    path.write_text(f"{first}\n{hashlib.sha256(body.encode()).hexdigest()}\n{body}")
+    path = forge(small, tmp_path, *change)
     try:
         found = hl.run(path).run["fault"]["message"]
     except InputFault as refused:

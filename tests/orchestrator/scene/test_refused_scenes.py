@@ -120,7 +120,7 @@ REFUSED = {
         ("iteration.tolerance=-1.0", "iteration.tolerance"),
         ("step_control={ tolerance = 1.0 }", "with a higher rate or `substeps`"),
         ("faults.discard=retry", "faults.discard: a step that an FMU discards ends the run"),
-        ("record.signals=some", '"all", "connected" or "none" or a list'),
+        ("record.signals=some", '"all", "connected" or "none", a list of texts or a table (Hz)'),
         ("hold=passive", NO_POWER),
         ("hold=nepce", NO_POWER),
         ("hold=pspm", "no held connection sets a spring"),

@@ -132,7 +132,8 @@ def test_it_is_swept_as_all_keys(tmp_path):
         ("{ table = [[0.0, 1.0], [0.0, 2.0]] }", "does not come after"),
         ("{ table = [] }", "the table has no rows"),
         ("{ table = [[0.0, 1.0], [1.0]] }", "row 2 has 1 numbers, the first one 2"),
-        ("{ table = [[0.0]] }", "at least one value beside its time"),
+        ("{ table = [[0.0], [0.1]] }", "at least one value beside its time"),
+        ("{ formula = [] }", "either a `table` or a `formula`"),
         ("{ formula = 't', units = ['N', 'N'] }", "2 `units` for 1 values"),
         ("{ formula = 't', units = ['furlong'] }", "furlong"),
         ("{ formulae = 't' }", "connection[0].from.formulae: unknown key"),
@@ -207,6 +208,9 @@ def test_a_run_feeds_a_text_of_another_one(tmp_path):
     ("of", "said"),
     [
         ('{ table = [[0.0, "a"]], interpolation = "linear" }', "texts are held until the next"),
+        ('{ table = [[0.0, "a"]], units = ["N"] }', "units = ['N']: texts are held until the next"),
+        ('{ table = [[0.0, "a"]], fomula = "t" }', "fomula = 't': texts are held"),
+        ("{ table = { path = 'bare.csv', columns = ['time'] } }", "one value beside its time"),
         ('{ table = [[0.0, "a"], [0.1, 2.0]] }', "row 2, [0.1, 2.0]: with texts a row is a time"),
         ('{ table = [[0.1, "a"], [0.1, "b"]] }', "row 2: 0.1 does not come after 0.1"),
         ('{ table = { path = "log.csv", columns = ["time", "mode"], units = ["ms", "N"] } }',
@@ -224,6 +228,14 @@ def test_what_feeds_no_text_is_refused_at_its_connection(tmp_path, of, said):
     assert said in str(refused.value)
     assert "connection[0]" in str(refused.value)
     assert len(str(refused.value).splitlines()) == 2
+
+
+@pytest.mark.parametrize("other", ['{ table = [[0.0, "b"]] }', '"fed.said"'])
+def test_a_text_that_is_fed_twice_is_refused(tmp_path, other):
+    path = scene(tmp_path, TEXT, {"s": '{ table = [[0.0, "a"]] }'}, SAYS)
+    path.write_text(path.read_text() + f'\n[[connection]]\nfrom = {other}\nto = "fed.s"\n')
+    with pytest.raises(SceneFault, match=r"connection\[0\].*fed\.s is fed by another .*; keep one"):
+        hl.run(path, figures=False)
 
 
 def test_a_number_takes_no_text(tmp_path):
