@@ -243,6 +243,12 @@ def test_times_that_are_no_numbers_are_named(log: Log, tmp_path: Path) -> None:
         hl.fit(tmp_path / "log.h5")
 
 
+def test_a_deviation_that_a_log_does_not_tell_is_none_in_json() -> None:
+    lost = Estimate("hand.mass[0]", "kg", 1.0, np.inf, 2.0)
+    assert json.loads(json.dumps(lost.record(), allow_nan=False))["standard_deviation"] is None
+    assert lost.text == "hand.mass[0] = 1 +- unknown kg (assumed 2)"
+
+
 def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> None:
     path = csv(log, tmp_path / "log.csv")
     lines = path.read_text().splitlines()
