@@ -9,6 +9,7 @@ from hapticlink.analysis.maps.stability_map import Map, compute_map
 from hapticlink.analysis.maps.z_width import compute_z_width
 from hapticlink.analysis.sweep.grid import Vary, axes
 from hapticlink.analysis.sweep.row import Row
+from hapticlink.analysis.sweep.run_sweep import Means
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.process import count_processes
 from hapticlink.orchestrator.results import folders
@@ -43,11 +44,9 @@ def stability_map(
 
     if check < 0:
         raise InputFault(f"--check {check}: give 0 or more")
-    processes, folder = count_processes(jobs), folders.ensure(out)
-    tell = progress or (lambda done, of: None)
-    given = overrides.write_options(options)
-    found = compute_map(scene, given, axes(vary), folder, processes, check, seed, tell)
-    figure_files.save({"map": drawing.draw(found)}, folder)
+    means = Means(folders.ensure(out), count_processes(jobs), progress)
+    found = compute_map(scene, overrides.write_options(options), axes(vary), means, check, seed)
+    figure_files.save({"map": drawing.draw(found)}, means.folder)
     return found
 
 
@@ -76,11 +75,8 @@ def z_width(
     """
     from hapticlink.visualization.figures import z_width_figure as drawing
 
-    processes, folder = count_processes(jobs), folders.ensure(out)
-    tell = progress or (lambda done, of: None)
-    over = axes(vary)
-    rows = compute_z_width(
-        scene, overrides.write_options(options), largest, over, folder, processes, tell
-    )
-    figure_files.save({"z-width": drawing.draw(rows, largest.partition("=")[0], over)}, folder)
+    means, over = Means(folders.ensure(out), count_processes(jobs), progress), axes(vary)
+    rows = compute_z_width(scene, overrides.write_options(options), largest, over, means)
+    drawn = drawing.draw(rows, largest.partition("=")[0], over)
+    figure_files.save({"z-width": drawn}, means.folder)
     return rows

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from hapticlink.analysis.sweep import grid, job, repeats, row, table
 from hapticlink.analysis.sweep.grid import Runs, Vary, points
-from hapticlink.analysis.sweep.run_sweep import Unfinished
+from hapticlink.analysis.sweep.run_sweep import Means, Unfinished
 from hapticlink.analysis.sweep.run_sweep import sweep as make
 from hapticlink.api.result import frame
 from hapticlink.orchestrator.base import temporary_folders
@@ -143,8 +143,7 @@ def sweep(
     keys = tuple(dict.fromkeys(key for point in varied for key in point))
 
     def into(folder: Path) -> list[row.Row]:
-        tell = progress or (lambda done, of: None)
-        return make(made, folder, processes, scheduler, lambda done: tell(done, len(made)))
+        return make(made, Means(folder, processes, progress, scheduler))
 
     if out is None:
         with temporary_folders.temporary_folder() as room:

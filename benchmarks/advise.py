@@ -27,6 +27,7 @@ from hapticlink.analysis.advise.advise_method import (
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.method import Method
 from hapticlink.analysis.sweep.row import METRIC, Row
+from hapticlink.analysis.sweep.run_sweep import Means
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene import overrides
@@ -76,11 +77,11 @@ def judged(seed: int, folder: Path, processes: int) -> Judged:
     """The advice for the scene of a seed, judged."""
     name, changes = drawn(seed)
     options = overrides.write_options(changes | {"packaging": "native"})
-    advice = advise(name, options, folder / "advice", processes=processes)
+    advice = advise(name, options, Means(folder / "advice", processes))
     read = open_scene.load(name, options)
     apart = list(draws(read, DRAWS, SEED))
     every = list(dict.fromkeys([*all_methods(read), advice.taken.method]))
-    rows = on_draws(name, options, every, apart, folder / "apart", processes=processes)
+    rows = on_draws(name, options, every, apart, Means(folder / "apart", processes))
     limits = advice.limits
     kept = {method: sum(not limits.why_not(row) for row in found) for method, found in rows.items()}
     able = [method for method in rows if kept[method] == DRAWS]

@@ -33,13 +33,14 @@ def advise(
         hapticlink advise closed-loop-direct --set graphics.rate=22
     """
     from hapticlink.analysis.advise.advise_method import advise as find
+    from hapticlink.analysis.sweep.run_sweep import Means
     from hapticlink.orchestrator.results import folders
     from hapticlink.orchestrator.results.write_files import write_json
 
-    processes = count_processes(jobs)
     folder = folders.ensure(output.out or changes.folder("advice", scene))
     with progress.runs(f"{title(scene)}: methods on it and around it", output.quiet) as tell:
-        advice = find(scene, changes.options, folder, processes=processes, seed=seed, tell=tell)
+        means = Means(folder, count_processes(jobs), tell)
+        advice = find(scene, changes.options, means, seed=seed)
     write_json(folder / "advice.json", advice.record())
     output.show(f"{title(scene)}:", (*advice.lines(), f"{folder}/"), advice.record())
     return 0

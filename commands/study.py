@@ -20,10 +20,8 @@ def study(*, out: Out = None, jobs: Jobs = None) -> int:
     processes = count_processes(jobs)
     guess = f"about {expected(processes):.0f} minutes with {processes} processes"
     with time_command("hapticlink study", guess), count_runs("study") as tell:
-        page = make(
-            out or Path("results/mismatch"), Path("sweeps/mismatch"), processes,
-            lambda stage, done, of: tell(done, of),
-        )  # fmt: skip
+        folder = out or Path("results/mismatch")
+        page = make(folder, Path("sweeps/mismatch"), processes, tell)
     if out is None:
         sign = checkout.function("study", "benchmarks.code_version:sign")
         sign(checkout.folder("study") / "results", "study", page)

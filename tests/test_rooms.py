@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7505,
     "fmus": 2997,
-    "orchestrator": 16839,
+    "orchestrator": 16819,
     "programs": 1045,
-    "analysis": 9172,
-    "visualization": 3856,
-    "api": 641,
-    "commands": 1638,
+    "analysis": 9118,
+    "visualization": 3852,
+    "api": 635,
+    "commands": 1636,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -9,7 +9,7 @@ in more than three quarters of the draws are within the spread.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from hapticlink.analysis.search.settings import EARLY, HOLDS
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import METRIC, Row
-from hapticlink.analysis.sweep.run_sweep import sweep
+from hapticlink.analysis.sweep.run_sweep import Means, sweep
 from hapticlink.components.specs.device import Observer
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
@@ -112,15 +112,13 @@ class Advice:
 def advise(
     scene: str | Path | Scene,
     options: Sequence[str],
-    folder: Path,
+    means: Means,
     *,
-    processes: int = 1,
     count: int = 8,
     seed: int = 0,
-    tell: Callable[[int, int], object] = lambda done, of: None,
 ) -> Advice:
-    """The advice for a scene; rows are kept in `folder`, where a later call continues. count: of
-    draws, `seed` draws them; tell: numbers of finished and of all runs so far.
+    """The advice for a scene; a later call with the same folder continues. count: of draws, `seed`
+    draws them.
 
     Raises InputFault for a scene without a device, a controller, a hand or anything that is held.
     """
@@ -132,7 +130,7 @@ def advise(
     around, apart, last = [(), *drawn[:count]], drawn[count : 2 * count], drawn[2 * count :]
 
     def run(of: Sequence[Method], drawn: Sequence[Sequence[str]]) -> dict[Method, list[Row]]:
-        return on_draws(scene, options, of, drawn, folder, processes=processes, tell=tell)
+        return on_draws(scene, options, of, drawn, means)
 
     screened = {method: rows[0] for method, rows in run(methods, [()]).items()}
 
@@ -152,7 +150,7 @@ def advise(
     if read.sensing == "ideal" or replace(read.device.observer, beside=False) != Observer():
         return advice
     other, taken = (*options, OTHER_OBSERVER), advice.taken.method
-    found = on_draws(scene, other, [taken], around, folder, processes=processes, tell=tell)
+    found = on_draws(scene, other, [taken], around, means)
     return replace(advice, kalman=measured(taken, found[taken], limits))
 
 
@@ -175,10 +173,7 @@ def on_draws(
     options: Sequence[str],
     methods: Sequence[Method],
     drawn: Sequence[Sequence[str]],
-    folder: Path,
-    *,
-    processes: int = 1,
-    tell: Callable[[int, int], object] = lambda done, of: None,
+    means: Means,
 ) -> dict[Method, list[Row]]:
     """The rows of methods on a scene with the options of each draw, in the order of the draws."""
     jobs = [
@@ -186,11 +181,7 @@ def on_draws(
         for method in methods
         for draw in drawn
     ]
-
-    def progress(done: int) -> None:
-        tell(done, len(jobs))
-
-    rows = sweep(jobs, folder, processes, tell=progress, measure=_numbers)
+    rows = sweep(jobs, means, _numbers)
     n = len(drawn)
     return {method: rows[i * n : (i + 1) * n] for i, method in enumerate(methods)}
 

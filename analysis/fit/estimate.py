@@ -33,19 +33,18 @@ class Estimate:
         return self.spread < LOOSE * abs(self.value)
 
     @property
-    def line(self) -> str:
+    def text(self) -> str:
         spread = short(self.spread) if np.isfinite(self.spread) else "unknown"
-        text = f"{self.key} = {short(self.value)} +- {spread} {self.unit}"
-        text += f" (assumed {short(self.assumed)})"
-        return text if self.determined else f"{text}: not determined by this log"
+        number = f"{short(self.value)} +- {spread} {self.unit}"
+        return f"{self.key} = {number} (assumed {short(self.assumed)})"
 
     def record(self) -> dict[str, Any]:
+        """Its part of fit.json; no deviation where the log tells none."""
         return {
             "value": self.value,
-            "standard_deviation": self.spread,
+            "standard_deviation": self.spread if np.isfinite(self.spread) else None,
             "unit": self.unit,
             "assumed": self.assumed,
-            "determined": self.determined,
         }
 
 

@@ -44,7 +44,8 @@ class Fitted:
 
     def lines(self) -> Iterator[str]:
         for estimate in self.estimates:
-            yield estimate.line
+            known = "" if estimate.determined else ": not determined by this log"
+            yield f"{estimate.text}{known}"
         if self.counts is not None:
             yield (
                 f"errors at the encoders: {self.counts:.3g} counts rms, where counting alone makes "
@@ -70,7 +71,9 @@ class Fitted:
     def record(self) -> dict[str, Any]:
         """The content of fit.json."""
         return {
-            "parameters": {e.key: e.record() for e in self.estimates},
+            "parameters": {
+                e.key: {**e.record(), "determined": e.determined} for e in self.estimates
+            },
             "encoder_errors_counts": self.counts,
             "unexplained": list(self.unexplained),
             "left_out": list(self.left_out),

@@ -23,6 +23,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from hapticlink.analysis.fit.estimate import Estimate
 from hapticlink.analysis.fit.log import read_columns
 from hapticlink.components.component import Variable
 from hapticlink.components.device.device_model import DeviceModel
@@ -33,7 +34,6 @@ from hapticlink.fmus.fmu_functions import GRAPHS
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.base.signal_names import DEVICE
-from hapticlink.orchestrator.results.numbers import short
 
 ANGLES, PLACE = f"{DEVICE}.q", "place"
 """Columns of a log."""
@@ -66,25 +66,19 @@ class Unknown:
 
 @dataclass(frozen=True)
 class FittedKinematics:
-    """What a log tells of the kinematics of a device. values, spreads: of `unknowns` (SI), infinite
-    spreads where a value cannot be told; gauges: the reasons, each with the unknowns that it
-    takes part in; counts: root mean square of the errors at the encoders before and after."""
+    """What a log tells of the kinematics of a device. estimates: of all unknowns (SI), with
+    infinite spreads where a value cannot be told; gauges: the reasons, each with the unknowns that
+    it takes part in; counts: root mean square of the errors at the encoders before and after; told:
+    how many combinations of the unknowns can be told."""
 
-    unknowns: tuple[Unknown, ...]
-    values: tuple[float, ...]
-    spreads: tuple[float, ...]
+    estimates: tuple[Estimate, ...]
     gauges: Mapping[str, tuple[str, ...]]
     counts: tuple[float, float]
     told: int
 
     def lines(self) -> Iterator[str]:
-        for unknown_, value, spread in zip(self.unknowns, self.values, self.spreads, strict=True):
-            if np.isfinite(spread):
-                yield (
-                    f"{unknown_.key} = {short(value)} +- {short(spread)} {unknown_.unit} "
-                    f"(assumed {short(unknown_.assumed)})"
-                )
-        yield f"{self.told} of {len(self.unknowns)} unknowns can be told"
+        yield from (each.text for each in self.estimates if np.isfinite(each.spread))
+        yield f"{self.told} of {len(self.estimates)} unknowns can be told"
         for gauge, names in self.gauges.items():
             yield f"cannot be told: {gauge}; it takes {', '.join(names)}: give some as known"
         before, after = self.counts
@@ -93,15 +87,7 @@ class FittedKinematics:
     def record(self) -> dict[str, Any]:
         """The content of fit.json."""
         return {
-            "parameters": {
-                u.key: {
-                    "value": value,
-                    "standard_deviation": spread if np.isfinite(spread) else None,
-                    "unit": u.unit,
-                    "assumed": u.assumed,
-                }
-                for u, value, spread in zip(self.unknowns, self.values, self.spreads, strict=True)
-            },
+            "parameters": {each.key: each.record() for each in self.estimates},
             "told": self.told,
             "gauges": {gauge: list(names) for gauge, names in self.gauges.items()},
             "encoder_errors_counts": list(self.counts),
@@ -146,10 +132,12 @@ def fit_kinematics(
     noise = np.sqrt(r @ r / max(len(r) - rank - z.size, 1))
     spreads = problem.scales * noise * np.sqrt(((own / s[:rank, None]) ** 2).sum(axis=0))
     free = (null**2).sum(axis=0) > NONE**2
+    spreads = np.where(free, np.inf, spreads)
     return FittedKinematics(
-        problem.unknowns,
-        tuple(map(float, theta)),
-        tuple(float(x) for x in np.where(free, np.inf, spreads)),
+        tuple(
+            Estimate(u.key, u.unit, float(value), float(spread), u.assumed)
+            for u, value, spread in zip(problem.unknowns, theta, spreads, strict=True)
+        ),
         problem.name_gauges(null, theta),
         (first, counts),
         rank,

@@ -3,16 +3,16 @@ runs."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from hapticlink.analysis.maps import boundary_lines, run_checks
 from hapticlink.analysis.maps.boundary_lines import Line
-from hapticlink.analysis.sweep.grid import Axis, grid, number
+from hapticlink.analysis.sweep.grid import Axis, grid
 from hapticlink.analysis.sweep.pool import keep_processes
 from hapticlink.analysis.sweep.row import Row
-from hapticlink.analysis.sweep.run_sweep import Judge, tabulate
+from hapticlink.analysis.sweep.run_sweep import Judge, Means, tabulate
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import InputFault
@@ -41,21 +41,19 @@ def compute_map(
     scene: str | Path | Scene,
     options: Sequence[str],
     axes: Sequence[Axis],
-    folder: Path,
-    processes: int,
+    means: Means,
     check: int = 0,
     seed: int = 0,
-    tell: Callable[[int, int], None] = lambda done, of: None,
 ) -> Map:
     """The map over `axes`: the first two of numbers are its plane, the others give panels. Along
     both keys, each pair of neighbours with different verdicts is followed to where the radius is
     1.
 
-    A line of points is kept in `folder`/rows when it is done, after which map.csv has it too; the
-    same call continues an interrupted map. Raises Unfinished if it is interrupted, InputFault
-    without an axis of numbers.
+    A line of points is kept in `rows` of the folder when it is done, after which map.csv has it
+    too; the same call continues an interrupted map. Raises Unfinished if it is interrupted,
+    InputFault without an axis of numbers.
     """
-    numeric = [axis for axis in axes if _numeric(axis)]
+    numeric = [axis for axis in axes if axis.is_scale]
     if not numeric:
         raise InputFault(
             "--vary: no key has two numbers or more; give one or two such keys, e.g. "
@@ -67,16 +65,7 @@ def compute_map(
     panels = grid(others)
 
     def add(lines: Sequence[Line], judge: Judge, before: Sequence[Row]) -> list[Row]:
-        return tabulate(
-            lines,
-            folder,
-            judge,
-            processes,
-            tell=lambda done: tell(done, len(lines)),
-            before=before,
-            name="map.csv",
-            each_time=True,
-        )
+        return tabulate(lines, means, judge, before=before, name="map.csv", each_time=True)
 
     lines = [
         line
@@ -92,7 +81,3 @@ def compute_map(
         rows = add(run_checks.jobs(scene, options, points), run_checks.judge, rows)
     first = open_scene.load(scene, options)
     return Map(first, rows, x.key, y.key if y else None, tuple(a.key for a in others))
-
-
-def _numeric(axis: Axis) -> bool:
-    return len(axis.values) > 1 and all(number(value) is not None for value in axis.values)

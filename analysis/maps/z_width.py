@@ -26,7 +26,7 @@ from hapticlink.analysis.stability.scene_variants import SceneVariants
 from hapticlink.analysis.sweep.grid import Axis, grid
 from hapticlink.analysis.sweep.job import Job, jobs
 from hapticlink.analysis.sweep.row import DONE, REFUSED, Row
-from hapticlink.analysis.sweep.run_sweep import tabulate
+from hapticlink.analysis.sweep.run_sweep import Means, tabulate
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.scene import overrides
@@ -44,26 +44,16 @@ def compute_z_width(
     options: Sequence[str],
     first: str,
     axes: Sequence[Axis],
-    folder: Path,
-    processes: int,
-    tell: Callable[[int, int], None] = lambda done, of: None,
+    means: Means,
 ) -> list[Row]:
-    """A row for each point of `axes`, also in `folder`/z-width.csv: the largest values, as that of
-    the first entry of a list, and how they were found. `first` is `key=value`, where the search
-    begins; a list is scaled as a whole. Raises InputFault for what is no positive number, and
-    Unfinished if it is interrupted, after which the same call continues."""
+    """A row for each point of `axes`, also in z-width.csv of the folder: the largest values, as
+    that of the first entry of a list, and how they were found. `first` is `key=value`, where the
+    search begins; a list is scaled as a whole. Raises InputFault for what is no positive number,
+    and Unfinished if it is interrupted, after which the same call continues."""
     key, values = parse(first)
     points = jobs(scene, [*options, f"{key}={text(values, key)}"], grid(axes))
     judge = partial(_judge, key=key, values=values)
-    return tabulate(
-        points,
-        folder,
-        judge,
-        processes,
-        tell=lambda done: tell(done, len(points)),
-        name="z-width.csv",
-        each_time=True,
-    )
+    return tabulate(points, means, judge, name="z-width.csv", each_time=True)
 
 
 def parse(first: str) -> tuple[str, Any]:

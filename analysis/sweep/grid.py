@@ -44,6 +44,11 @@ class Axis:
     key: str
     values: tuple[str, ...]
 
+    @property
+    def is_scale(self) -> bool:
+        """Whether it has several values, all of them numbers."""
+        return len(self.values) > 1 and all(number(value) is not None for value in self.values)
+
 
 def points(vary: Vary, runs: Runs) -> list[Point]:
     """The points of every combination of `vary`, or of `runs`. Raises InputFault unless exactly one

@@ -10,6 +10,7 @@ import shutil
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -31,12 +32,24 @@ Judge = Callable[[Any, Path], Row]
 several points has them as `rows`."""
 Together = Callable[[Sequence[Job]], Sequence[Row | None]]
 """Of jobs, the rows of those that are done in one go."""
-Tell = Callable[[int], None]
+Tell = Callable[[int, int], object]
+"""With the numbers of finished and of all jobs."""
 TOGETHER = 8 * MOST
 """Runs that a process gets at a time, which share what is read and looked up for them."""
 MANY = 500
 """Runs of a sweep from which on it compiles steps of several instances: a third as long as it takes
 to compile them is won by so many, and all of it by the next sweeps."""
+
+
+@dataclass(frozen=True)
+class Means:
+    """The folder in which rows are kept, the number of processes, who is told of the progress, and
+    the address of the Dask scheduler that gives jobs to others instead."""
+
+    folder: Path
+    processes: int = 1
+    tell: Tell | None = None
+    scheduler: str | None = None
 
 
 class Unfinished(Fault):
@@ -130,42 +143,33 @@ def _of_scene(fault: Fault | Interrupted) -> bool:
     return fault.repeatable and not isinstance(fault.__cause__, OSError)
 
 
-def sweep(
-    jobs: Sequence[Job],
-    folder: Path,
-    processes: int,
-    scheduler: str | None = None,
-    tell: Tell = lambda done: None,
-    measure: Measure = measure,
-) -> list[Row]:
+def sweep(jobs: Sequence[Job], means: Means, measure: Measure = measure) -> list[Row]:
     """The rows of the runs of `jobs`, as `tabulate`."""
     judge = partial(run, measure=measure)
     together = partial(run_together, compiles=len(jobs) >= MANY, measure=measure)
-    return tabulate(jobs, folder, judge, processes, together, scheduler=scheduler, tell=tell)
+    return tabulate(jobs, means, judge, together)
 
 
 @interrupt.defer_signals()
 def tabulate(
     jobs: Sequence[Job],
-    folder: Path,
+    means: Means,
     judge: Judge,
-    processes: int,
     together: Together | None = None,
     *,
-    scheduler: str | None = None,
-    tell: Tell = lambda done: None,
     before: Sequence[Row] = (),
     name: str = "table.csv",
     each_time: bool = False,
 ) -> list[Row]:
-    """The rows of `jobs`, in their order, each with its point, behind those `before`; `tell` is
-    called with the number of finished jobs. together: does several of them in one go.
+    """The rows of `jobs`, in their order, each with its point, behind those `before`. together:
+    does several of them in one go.
 
-    A row is stored in `folder`/rows when its job ends and is reused by a later call, unless that
-    failed for a reason other than its scene. The table `name` is written at the end, or `each_time`
-    that a job ends. Raises Unfinished if the sweep is interrupted, after writing the table with the
-    rows so far, and Fault if the disk is full.
+    A row is stored in `rows` of the folder when its job ends and is reused by a later call, unless
+    that failed for a reason other than its scene. The table `name` is written at the end, or
+    `each_time` that a job ends. Raises Unfinished if the sweep is interrupted, after writing the
+    table with the rows so far, and Fault if the disk is full.
     """
+    folder, tell = means.folder, means.tell or (lambda done, of: None)
     try:
         stored = table.Rows(folder / "rows")
         rows = {j.key: row for j in jobs if j.scene and (row := stored.find(j.key))}
@@ -183,17 +187,17 @@ def tabulate(
             table.write(folder / name, found)
             return found
 
-        tell(finished := len(done()))
+        tell(finished := len(done()), len(jobs))
         points = Counter(j.key for j in jobs if j.scene)
         try:
-            for job, row in _finished(missing, folder, processes, scheduler, judge, together):
+            for job, row in _finished(missing, means, judge, together):
                 if row["end"] == INTERRUPTED:  # a signal reached the worker too
                     continue
                 if row["end"] != DIED:  # the next sweep repeats those
                     stored.keep(job.key, row)
                 rows[job.key] = row
                 finished += points[job.key]
-                tell(finished)
+                tell(finished, len(jobs))
                 if each_time:
                     write()
         except Interrupted:
@@ -219,18 +223,14 @@ _CLOCKS = attrgetter("haptics", "graphics", "duration", "start_time")
 
 
 def _finished(
-    jobs: Sequence[Job],
-    folder: Path,
-    processes: int,
-    scheduler: str | None,
-    judge: Judge,
-    together: Together | None,
+    jobs: Sequence[Job], means: Means, judge: Judge, together: Together | None
 ) -> Iterator[pool.Done]:
     """Each job with its row, as they finish."""
-    if scheduler:
-        yield from cluster.on_cluster(partial(work, folder=None, judge=judge), jobs, scheduler)
+    if means.scheduler:
+        alone = partial(work, folder=None, judge=judge)
+        yield from cluster.on_cluster(alone, jobs, means.scheduler)
         return
-    running = folder / ".running"
+    running, processes = means.folder / ".running", means.processes
     clear = partial(shutil.rmtree, running, ignore_errors=True)
     clear()  # left by a sweep that was killed
     running.mkdir(parents=True)

@@ -52,9 +52,7 @@ class BlindTrial:
     def of(cls, vary: grid.Vary) -> BlindTrial:
         """That of every combination of values. Raises InputFault where two keys have levels."""
         axes = grid.axes(vary)
-        scales = [
-            axis.key for axis in axes if len(axis.values) > 1 and all(map(_is_number, axis.values))
-        ]
+        scales = [axis.key for axis in axes if axis.is_scale]
         if len(scales) > 1:
             raise InputFault(
                 f"--vary {scales[0]} and {scales[1]}: a threshold is one of one key: give one "
@@ -162,10 +160,3 @@ class BlindTrial:
             for i, a in enumerate(self.answers, start=1):
                 values = (self.settings[a.setting].get(key, "") for key in keys)
                 writer.writerow((i, *values, a.varied, a.answer, int(a.right)))
-
-
-def _is_number(text: str) -> bool:
-    try:
-        return math.isfinite(float(text))
-    except ValueError:
-        return False

@@ -18,10 +18,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize, special, stats
 
-Vector = NDArray[np.float64]
+from hapticlink.orchestrator.base.arrays import Vector
+
 GUESS = 0.5
 """Share of right answers of somebody who feels no difference between two."""
 MOST_LAPSES = 0.06

@@ -4,9 +4,8 @@ one are on the disk."""
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
-from functools import partial
 from pathlib import Path
 
 from hapticlink.fmus.atomic_file import atomic_file
@@ -21,7 +20,7 @@ from hapticlink.orchestrator.results.run_record import (
     RunSetup,
     content,
 )
-from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.run_results import Recorder, RunResults, TableRows
 from hapticlink.orchestrator.results.write_files import (
     FileRecorder,
     text,
@@ -81,8 +80,8 @@ class RunFolder(RunResults):
         """The number of messages in the log, by FMU and status."""
         return count_messages(self._log)
 
-    def _recorder_of(self, clock: str) -> Callable[..., FileRecorder]:
-        return partial(FileRecorder, self.folder / f"{clock}.csv")
+    def _new_recorder(self, clock: str, of: TableRows) -> Recorder:
+        return FileRecorder(self.folder / f"{clock}.csv", of, self._publish)
 
     def finish(self) -> None:
         if self._csv:

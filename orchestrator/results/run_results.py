@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
@@ -15,12 +15,25 @@ from hapticlink.orchestrator.results.read_results import Table
 from hapticlink.orchestrator.results.rows_file import name_texts
 
 
+@dataclass(frozen=True)
+class TableRows:
+    """The rows of a table: `time` and those `values` whose places the columns `recorded` name, at
+    every `every`-th call of `Recorder.row`, and at the one numbered `end`, the last one, from 0 on;
+    where `recorded` is None there is no table, and rows are counted only. most: calls that there
+    may be, where a rate may be raised during the run. before: calls in the run that this one goes
+    on from. texts: the FMI types of those columns that are texts, by their places in a row."""
+
+    recorded: Mapping[str, int] | None
+    values: Vector
+    every: int = 1
+    end: int = 0
+    most: int = 0
+    before: int = 0
+    texts: Mapping[int, str] = field(default_factory=dict)
+
+
 class Recorder:
-    """Records rows of a table: `time` and those `values` whose places the columns `recorded` name,
-    at every `every`-th call of `row`, and at the one numbered `end`, the last one, from 0 on; where
-    `recorded` is None there is no table, and rows are counted only. `first` is called after the
-    first row. most: calls of `row` that there may be, where a rate may be raised during the run.
-    before: calls of `row` in the run that this one goes on from. A context manager.
+    """Records rows. `first` is called after the first one. A context manager.
 
     rows: of the whole run, of which `filled` are written. `view` is `values` at `places` where
     these are side by side, else None. `due`: whether the next row is written. `room`: the rows that
@@ -30,31 +43,20 @@ class Recorder:
 
     files: tuple[str, ...] = ()
     """The names of those to which rows are written."""
-    texts: Mapping[int, str] = MappingProxyType({})
-    """The FMI types of those columns that are texts, by their places in a row."""
 
-    def __init__(
-        self,
-        recorded: Mapping[str, int] | None,
-        values: Vector,
-        first: Callable[[], object],
-        every: int = 1,
-        end: int = 0,
-        most: int = 0,
-        before: int = 0,
-    ) -> None:
-        places = [*(recorded or {}).values()]
-        self.values, self.places = values, np.array(places, np.int64)
-        self.every, self.end = every, end
-        self.columns = ("time", *(recorded or ()))
+    def __init__(self, of: TableRows, first: Callable[[], object]) -> None:
+        places, values = [*(of.recorded or {}).values()], of.values
+        self.values, self.places, self.texts = values, np.array(places, np.int64), of.texts
+        self.every, self.end, before = of.every, of.end, of.before
+        self.columns = ("time", *(of.recorded or ()))
         span = slice(places[0], places[-1] + 1) if places else slice(0)
         self.view = values[span] if places == [*range(len(values))[span]] else None
         self._first, self.before = first, before
-        due = before % every == 0 or before == end
+        due = before % of.every == 0 or before == of.end
         self.due, self.room, self.count = (ctypes.c_int64(n) for n in (due, 0, before))
         self.reached = ctypes.c_double()
-        coming = max(end - before, most) // every + 2
-        self.rows, self.filled = self._new_rows(recorded is not None, coming)
+        coming = max(of.end - before, of.most) // of.every + 2
+        self.rows, self.filled = self._new_rows(of.recorded is not None, coming)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         """Room for the rows of the whole run, and the number of those that are written."""
@@ -129,25 +131,13 @@ class RunResults:
         self.folder, self.published = folder, False
         self._recorders: dict[str, Recorder] = {}
 
-    def recorder(
-        self,
-        clock: str,
-        recorded: Mapping[str, int] | None,
-        values: Vector,
-        every: int = 1,
-        end: int = 0,
-        most: int = 0,
-        before: int = 0,
-    ) -> Recorder:
+    def recorder(self, clock: str, of: TableRows) -> Recorder:
         """The recorder of a clock. All recorders have to be created before the first row."""
-        new = self._recorder_of(clock)
-        made = new(recorded, values, self._publish, every, end, most, before)
-        self._recorders[clock] = made
+        self._recorders[clock] = made = self._new_recorder(clock, of)
         return made
 
-    def _recorder_of(self, clock: str) -> Callable[..., Recorder]:
-        """What makes the recorder of a clock, from the arguments of `Recorder`."""
-        return Recorder
+    def _new_recorder(self, clock: str, of: TableRows) -> Recorder:
+        return Recorder(of, self._publish)
 
     def finish(self) -> None:
         """Make the CSVs of all clocks. Raises OSError, as on a full disk; the rows can be read

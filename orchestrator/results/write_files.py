@@ -16,7 +16,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.fmi import transfer
 from hapticlink.orchestrator.results import rows_file
-from hapticlink.orchestrator.results.run_results import Recorder
+from hapticlink.orchestrator.results.run_results import Recorder, TableRows
 
 
 class FileRecorder(Recorder):
@@ -26,24 +26,14 @@ class FileRecorder(Recorder):
     Raises OSError, as on a full disk.
     """
 
-    def __init__(
-        self,
-        path: Path,
-        recorded: Mapping[str, int] | None,
-        values: Vector,
-        first: Callable[[], object],
-        every: int = 1,
-        end: int = 0,
-        most: int = 0,
-        before: int = 0,
-    ) -> None:
+    def __init__(self, path: Path, of: TableRows, first: Callable[[], object]) -> None:
         self.path, self.target = path, path.with_suffix(rows_file.SUFFIX)
         self._unfinished = path.with_name(f".{self.target.name}.{os.getpid()}")
         if sys.platform == "win32":  # which moves no open file
             self._unfinished = self.target
         self._file: rows_file.RowsBeingWritten | None = None
         self._published, self._full = False, 0.0
-        super().__init__(recorded, values, first, every, end, most, before)
+        super().__init__(of, first)
 
     def _new_rows(self, recorded: bool, most: int) -> tuple[Vector | None, ctypes.c_int64]:
         if not recorded:

@@ -12,7 +12,7 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.calls_of_fmi import InProcess
 from hapticlink.orchestrator.network.remote_fmu import FRAME, FRAMES, Remote
 from hapticlink.orchestrator.results.run_record import LinkCounts, Premises
-from hapticlink.orchestrator.results.run_results import Recorder, RunResults
+from hapticlink.orchestrator.results.run_results import Recorder, RunResults, TableRows
 from hapticlink.orchestrator.run.apply_changes import InputSetter
 from hapticlink.orchestrator.run.compiled import structures
 from hapticlink.orchestrator.run.compiled.hold_structures import (
@@ -160,8 +160,9 @@ class Simulation(LoadedFmus):
             before = self.rows_before.get(clock.name, 0)
             for name, every in self.system.recording.tables(clock.name).items():
                 recorded, values = self.signals.recorded(name), self.signals.values
-                recorder = self._results.recorder(name, recorded, values, every, end, most, before)
-                recorder.texts = self.signals.texts(recorded)
+                texts = self.signals.texts(recorded)
+                rows = TableRows(recorded, values, every, end, most, before, texts)
+                recorder = self._results.recorder(name, rows)
                 self.recorders[name] = self._stack.enter_context(recorder)
             recorder = self.recorders[clock.name]
             for fmu in self.system.fmus:
@@ -181,7 +182,9 @@ class Simulation(LoadedFmus):
         """A table of what runs beside the loop; its row of t = 0 is there at once."""
         recorded = {column: i for i, column in enumerate(columns)}
         most = self.system.timeline.points(self.system.timeline.clocks[0])
-        recorder = self._results.recorder(name, recorded, np.zeros(len(columns)), end=most)
+        recorder = self._results.recorder(
+            name, TableRows(recorded, np.zeros(len(columns)), end=most)
+        )
         self._stack.enter_context(recorder)
         recorder.row(0.0)
         return recorder

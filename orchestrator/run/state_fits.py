@@ -54,7 +54,7 @@ def why_no_fit(state: RunState, system: System) -> Iterator[str]:
         yield "start_time is another: leave it as it was"
     yield from _why_other_clocks(state, system)
     yield from _why_other_changes(state, system)
-    if not missing and {*saved["connections"]} == {*system.connection}:
+    if {*saved["connections"]} == {*system.connection}:
         yield from _why_other_holds(state, system)
     yield from _why_other_starts(state, system)
 

@@ -16,9 +16,16 @@ from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path
 
 
-def argument_fields(arguments: Iterable[inspect.Parameter]) -> list[tuple[str, Any, Any]]:
-    """Name, annotation and field of each argument, for a record."""
-    return [(a.name, a.annotation, field(**_default(a))) for a in arguments]
+def make_record(
+    name: str, arguments: Iterable[inspect.Parameter], module: str, *first: tuple[str, Any]
+) -> Any:
+    """A record with the fields `first`, and one for each of the arguments of a function of that
+    module."""
+    named = ((a.name, a.annotation, field(**_default(a))) for a in arguments)
+    record = make_dataclass(name, [*first, *named], kw_only=True)
+    # Resolves annotations that are texts; from Python 3.12 on make_dataclass sets it by itself.
+    record.__module__ = module
+    return record
 
 
 def _default(argument: inspect.Parameter) -> dict[str, Any]:

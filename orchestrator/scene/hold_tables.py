@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, make_dataclass
+from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
 
@@ -15,7 +15,7 @@ import pydantic
 
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.holds import HOLDS, HoldRow, parameters_in
-from hapticlink.orchestrator.scene.argument_records import argument_fields, errors_at, read_strictly
+from hapticlink.orchestrator.scene.argument_records import errors_at, make_record, read_strictly
 from hapticlink.orchestrator.scene.overrides import toml
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, entries, value
 
@@ -36,10 +36,8 @@ def parameters_of(name: Any) -> Any:
 @cache
 def _record(kind: Any) -> Any:
     own = [] if isinstance(kind, HoldRow) else [*inspect.signature(kind).parameters.values()]
-    named = argument_fields(own[1:])  # behind the context
-    record = make_dataclass("HoldParameters", [("type", str), *named], kw_only=True)
-    record.__module__ = getattr(kind, "__module__", __name__)
-    return record
+    module = getattr(kind, "__module__", __name__)
+    return make_record("HoldParameters", own[1:], module, ("type", str))  # behind the context
 
 
 def find_hold_tables(data: Any) -> Iterator[tuple[Path, Any]]:

@@ -206,12 +206,10 @@ def _entry(path: Path, number: int, fields: Sequence[str], place: int, of_a_valu
     field = fields[place] if place < len(fields) else ""
     if of_a_value and (truth := field.strip().lower()) in ("true", "false"):
         return float(truth == "true")
-    if (value := _number(field)) is None:
-        raise ValueError(f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no number")
-    if not math.isfinite(value):
-        raise ValueError(
-            f"{path}: line {number}, column {place + 1}: {field[:100]!r} is no finite number"
-        )
+    if (value := _number(field)) is None or not math.isfinite(value):
+        where = f"{path}: line {number}, column {place + 1}"
+        finite = "" if value is None else "finite "
+        raise ValueError(f"{where}: {field[:100]!r} is no {finite}number")
     return value
 
 

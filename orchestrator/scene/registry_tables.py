@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, make_dataclass, replace
+from dataclasses import fields, replace
 from functools import cache
 from typing import Any
 
@@ -13,7 +13,7 @@ import pydantic
 
 from hapticlink.components.blocks import BLOCKS
 from hapticlink.orchestrator.scene import hold_tables
-from hapticlink.orchestrator.scene.argument_records import argument_fields, errors_at, read_strictly
+from hapticlink.orchestrator.scene.argument_records import errors_at, make_record, read_strictly
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem, entries, value
 
@@ -47,11 +47,7 @@ def record_of(path: Path, data: Any) -> Any:
 @cache
 def _arguments(block: Callable[..., Any]) -> Any:
     """A record of a block's arguments."""
-    named = argument_fields(inspect.signature(block).parameters.values())
-    record = make_dataclass("Settings", named, kw_only=True)
-    # Resolves annotations that are texts; from Python 3.12 on make_dataclass sets it by itself.
-    record.__module__ = block.__module__
-    return record
+    return make_record("Settings", inspect.signature(block).parameters.values(), block.__module__)
 
 
 def read_registry_tables(data: Any) -> tuple[dict[Path, Any], list[Any], list[Problem]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
 from operator import attrgetter
@@ -93,13 +93,20 @@ def _start(description: Description, name: str, value: Value) -> Starts:
     """The start value of each scalar of `name`. Raises ValueError for a name that takes no start
     value, and for a value of a different size, type or range."""
     scalars = settable(description, name, start=True)
-    values = tuple(entries_of(value, scalars[-1].indices, name))
+    given = entries_for(scalars, value, name)
+    return tuple((s, fit_start_value(s, entry)) for s, entry in given)
+
+
+def entries_for(scalars: Sequence[Scalar], value: Any, name: str) -> list[tuple[Scalar, Any]]:
+    """The scalars of `name`, each with its entry of a value. Raises ValueError for a value of
+    another size."""
+    values = [*_entries_of(value, scalars[-1].indices, name)]
     if len(values) != len(scalars):
         raise ValueError(f"{len(values)} values for the {len(scalars)} of {name}")
-    return tuple((s, fit_start_value(s, given)) for s, given in zip(scalars, values, strict=True))
+    return [*zip(scalars, values, strict=True)]
 
 
-def entries_of(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
+def _entries_of(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
     """The entries of a value, row by row. Raises ValueError for rows that do not fit `shape`."""
     if not isinstance(value, tuple):
         yield value
@@ -107,7 +114,7 @@ def entries_of(value: Any, shape: tuple[int, ...], name: str) -> Iterator[Any]:
         yield from value
     else:
         rows, size = (shape[0], math.prod(shape[1:])) if shape else (1, 1)
-        entries = [tuple(entries_of(row, shape[1:], name)) for row in value]
+        entries = [tuple(_entries_of(row, shape[1:], name)) for row in value]
         sizes = [len(row) for row in entries]
         if sizes != [size] * rows:
             raise ValueError(f"rows of {sizes} values for the {rows} rows of {size} of {name}")

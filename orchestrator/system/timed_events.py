@@ -20,7 +20,7 @@ from hapticlink.orchestrator.system.changes import (
     number_of_point,
     settable,
 )
-from hapticlink.orchestrator.system.fmu_tables import entries_of
+from hapticlink.orchestrator.system.fmu_tables import entries_for
 from hapticlink.orchestrator.system.ports import carries_power, scalars_of
 from hapticlink.orchestrator.system.system import Connection, InputChange, System
 from hapticlink.orchestrator.system.timeline import GRAPHICS_RATE
@@ -139,12 +139,10 @@ class _Events:
 
 
 def _numbers(name: str, value: Value, scalars: tuple[Scalar, ...]) -> tuple[float, ...]:
-    entries = tuple(entries_of(value, scalars[-1].indices, name))
-    if len(entries) != len(scalars):
-        raise ValueError(f"{len(entries)} values for the {len(scalars)} of {name}")
-    for scalar, entry in zip(scalars, entries, strict=True):
+    given = entries_for(scalars, value, name)
+    for scalar, entry in given:
         _require_type(scalar, entry)
-    return tuple(as_signal(*each) for each in zip(scalars, entries, strict=True))
+    return tuple(as_signal(*each) for each in given)
 
 
 def _require_type(scalar: Scalar, number: bool | float | str) -> None:

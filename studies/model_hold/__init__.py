@@ -23,7 +23,7 @@ from hapticlink.analysis.search.settings import GAINS as NAMED
 from hapticlink.analysis.sweep import table
 from hapticlink.analysis.sweep.job import Job, job
 from hapticlink.analysis.sweep.row import METRIC, Row
-from hapticlink.analysis.sweep.run_sweep import sweep
+from hapticlink.analysis.sweep.run_sweep import Means, sweep
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.results import folders
@@ -326,14 +326,13 @@ def study(folder: Path, room: Path, processes: int = 2) -> None:
     """Runs what has no row in `room` yet, and writes the results to `folder`."""
     folders.ensure(folder)
     every = list(runs())
-    step = max(1, len(every) // 100)
 
-    def tell(done: int) -> None:
-        if done % step == 0:
-            print(f"{done} of {len(every)}", flush=True)
+    def tell(done: int, of: int) -> None:
+        if done % max(1, of // 100) == 0:
+            print(f"{done} of {of}", flush=True)
 
     further = [*others(), *accounted()]
-    rows = sweep([*every, *further], room, processes, tell=tell, measure=_measure)
+    rows = sweep([*every, *further], Means(room, processes, tell), _measure)
     kept = ("end", METRIC, "theta_max_rad", "port_peak_J", "hand_work_J")
     columns = ("case", "seed", "method", "gains", "rate", "otherwise", *kept)
     table.write(

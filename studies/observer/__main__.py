@@ -17,17 +17,16 @@ def main() -> None:
     asked = parser.parse_args()
     plugins.load(("studies.observer.plugin",))
     from hapticlink.analysis.sweep import table
-    from hapticlink.analysis.sweep.run_sweep import sweep
+    from hapticlink.analysis.sweep.run_sweep import Means, sweep
     from studies.observer import cases, measure, page
 
     jobs = cases.jobs()
-    every = max(1, len(jobs) // 20)
 
-    def tell(done: int) -> None:
-        if done % every == 0:
-            print(f"{done} of {len(jobs)} runs", flush=True)
+    def tell(done: int, of: int) -> None:
+        if done % max(1, of // 20) == 0:
+            print(f"{done} of {of} runs", flush=True)
 
-    rows = sweep(jobs, Path("sweeps/observer"), asked.jobs, tell=tell, measure=measure.of_run)
+    rows = sweep(jobs, Means(Path("sweeps/observer"), asked.jobs, tell), measure.of_run)
     asked.out.mkdir(parents=True, exist_ok=True)
     table.write(asked.out / "runs.csv", [page.rounded(row) for row in rows])
     print(page.write(asked.out, rows))

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import base64
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hapticlink.analysis.findings import summary
 from hapticlink.orchestrator.results.read_results import Results
@@ -16,6 +15,7 @@ from hapticlink.orchestrator.results.recorded_scene import scene_file
 from hapticlink.visualization.compare import numbers, overlay, settings
 from hapticlink.visualization.compare.numbers import Row
 from hapticlink.visualization.figure_axes import plain
+from hapticlink.visualization.figure_files import encode
 from hapticlink.visualization.figures import run_figures as of_a_run
 
 if TYPE_CHECKING:
@@ -126,10 +126,7 @@ def _figures(runs: Mapping[str, Results]) -> Iterator[str]:
 
 
 def _picture(name: str, figure: Figure) -> str:
-    file = io.BytesIO()
-    kept: dict[str, Any] = {"metadata": {"Software": None}}  # the same bytes every time
-    figure.savefig(file, format="png", dpi=110, **kept)
-    data = base64.b64encode(file.getvalue()).decode()
+    data = base64.b64encode(encode(figure, "png", dpi=110)).decode()
     wide = ' class="wide"' if figure.get_figwidth() > WIDE else ""
     return f'<figure{wide}><img alt="{escape(name)}" src="data:image/png;base64,{data}"></figure>'
 

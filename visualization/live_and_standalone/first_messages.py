@@ -12,12 +12,18 @@ from hapticlink.analysis.findings import labels
 from hapticlink.analysis.findings.user_port import NOTICEABLE_J
 from hapticlink.components.dynamics.assembly import start_coordinates
 from hapticlink.orchestrator.base.signal_names import DEVICE, HAND, PASS_ON
-from hapticlink.orchestrator.scene.blocks import driver_of
+from hapticlink.orchestrator.scene.blocks import described_devices, driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import Connection, System
 from hapticlink.visualization.live_and_standalone.offered_controls import users
 from hapticlink.visualization.mechanism.marks import KINDS, SHAPES
 from hapticlink.visualization.mechanism.picture import PORT, Picture
+
+
+def describe_opening(scene: Scene) -> dict[str, Any]:
+    """What the server makes `open_page` of, with the title and the arguments of Picture."""
+    drawing = (scene.linkage, described_devices(scene), scene.contacts)
+    return {"type": "opening", "title": scene.title, "picture": drawing}
 
 
 def open_page(title: str, *drawing: Any) -> dict[str, Any]:

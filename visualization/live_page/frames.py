@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any
 
 from hapticlink.orchestrator.base.signal_names import MECHANISM_ENERGY
 from hapticlink.orchestrator.real_time_session import LiveRun
+from hapticlink.visualization.live_page.server_pipe import Pipe
 from hapticlink.visualization.mechanism.frame_signals import outputs
 
+FRAME = 0.015
+"""Time (s) between two frames, at least."""
 SELDOM = 5
 """Turns between two readings of energies and deadlines, which take longer."""
 
@@ -19,7 +23,13 @@ class FrameReader:
         fmus = live.system.fmu
         self._outputs = outputs(fmus)
         self._others = {user: outputs(fmus, user) for user in live.scene.devices}
-        self._turns = 0
+        self._turns, self._sent = 0, 0.0
+
+    def send(self, live: LiveRun, link: Pipe) -> None:
+        """Send a frame, where the last one is FRAME ago."""
+        if (now := time.monotonic()) - self._sent > FRAME:
+            self._sent = now
+            link.send({"type": "frame"} | self.frame(live), frame=True)
 
     def handles(self, live: LiveRun) -> dict[str, list[float]]:
         """The poses (3,) of the handles by user, "" for the first one."""

@@ -15,7 +15,7 @@ from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.scene.blocks import described_devices, driver_of
+from hapticlink.orchestrator.scene.blocks import driver_of
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system import fmu_files
 from hapticlink.orchestrator.system.build_system import build_system
@@ -28,9 +28,8 @@ from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import FrameReader
 from hapticlink.visualization.live_page.server_pipe import Pipe
 
-TURN, FRAME = 0.0035, 0.015
-"""Times (s) between two looks at the messages while the scene runs, every other tick at 512 Hz,
-and between two frames, at most."""
+TURN = 0.0035
+"""Time (s) between two looks at the messages while the scene runs, every other tick at 512 Hz."""
 WAIT = 0.02
 """Time (s) between two looks at the messages while nothing runs."""
 
@@ -70,7 +69,6 @@ class LiveSession:
         self._controls: Controls | None = None
         self._settings = settings or {}
         self._scene = with_model(scene, self._settings.get(MODEL))
-        self._shown = 0.0
         self._state: dict[str, Any] = {"paused": paused, "recording": None, "ended": None}
         self.recordings: list[Path] = []
         self._waiting: list[messages.Message] = []
@@ -80,8 +78,7 @@ class LiveSession:
         """Run until Ctrl-C, which raises RunInterrupted or Interrupted, or until the server has
         ended, which raises Fault."""
         scene = self._scene
-        drawing = (scene.linkage, described_devices(scene), scene.contacts)
-        self._say("opening", title=scene.title, picture=drawing)
+        self._link.send(first_messages.describe_opening(scene))
         with self._before:  # it ends where the first run begins
             took = self._before.enter_context(record_duration(f"{scene.title}: FMUs of its page"))
             Building(self._link, took)
@@ -138,9 +135,7 @@ class LiveSession:
         if changed:
             self._tell_controls()
         self._require_server()
-        if (now := time.monotonic()) - self._shown > FRAME:
-            self._shown = now
-            self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+        self._frames.send(live, self._link)
 
     def _refuse(self, message: messages.Message, fault: InputFault) -> None:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""

@@ -13,14 +13,13 @@ from typing import Any
 from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.errors import Fault
 from hapticlink.orchestrator.real_time_session import LiveRun
-from hapticlink.orchestrator.scene.blocks import described_devices
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.live_and_standalone import first_messages
 from hapticlink.visualization.live_page import messages
 from hapticlink.visualization.live_page.controls import Controls
 from hapticlink.visualization.live_page.frames import FrameReader
 from hapticlink.visualization.live_page.server_pipe import Pipe
-from hapticlink.visualization.live_page.session import FRAME, TURN, WAIT
+from hapticlink.visualization.live_page.session import TURN, WAIT
 
 LABELS = {"y": "Feel it", "1": "The first", "2": "The second", "q": "End the trials"}
 """What buttons say, by the answer that they give."""
@@ -35,8 +34,8 @@ class TrialPage:
 
     def __init__(self, link: Pipe, real_time: Callable[[Scene], Any], scene: Scene) -> None:
         self._link, self._real_time = link, real_time
-        self._numbers, self._shown, self._failed = count(1), 0.0, ""
-        self._open(scene)
+        self._numbers, self._failed = count(1), ""
+        link.send(first_messages.describe_opening(scene))
 
     def ask(self, question: str, answers: str) -> str:
         """The answer, one of those that / separates, to a question; "q" at Ctrl-C. Raises Fault
@@ -65,14 +64,10 @@ class TrialPage:
     def feel(self, scene: Scene, folder: Path) -> None:
         """Run a scene, pulled by the mouse or held by a board, to its duration. One that fails has
         been felt until then, which the next question says."""
-        self._open(scene)
+        self._link.send(first_messages.describe_opening(scene))
         self._controls: Controls | None = None
         ended = self._real_time(scene).run(self._turn, folder, every=TURN, figures=False)
         self._failed = "it has failed before its end; " if ended.fault else ""
-
-    def _open(self, scene: Scene) -> None:
-        picture = (scene.linkage, described_devices(scene), scene.contacts)
-        self._link.send({"type": "opening", "title": scene.title, "picture": picture})
 
     def _turn(self, live: LiveRun) -> None:
         if self._controls is None:
@@ -82,9 +77,7 @@ class TrialPage:
         for message in messages.newest(self._received()):
             if isinstance(message, messages.Hand):
                 self._controls.apply(message)
-        if (now := time.monotonic()) - self._shown > FRAME:
-            self._shown = now
-            self._link.send({"type": "frame"} | self._frames.frame(live), frame=True)
+        self._frames.send(live, self._link)
 
     def _received(self) -> list[Any]:
         if not self._link.alive:

@@ -14,6 +14,7 @@ from hapticlink.analysis.advise.draws import FACTOR, draws
 from hapticlink.analysis.advise.method import Measured, Method
 from hapticlink.analysis.search.acceptance import AcceptanceLimits
 from hapticlink.analysis.search.settings import HOLDS
+from hapticlink.analysis.sweep.run_sweep import Means
 from hapticlink.orchestrator import open_scene
 from tests.analysis.search.test_acceptance import row
 
@@ -68,7 +69,7 @@ def test_draws_are_other_hands_of_the_same_kind(scene: str) -> None:
 
 def test_a_scene_without_a_hand_gets_no_advice(tmp_path: Path) -> None:
     with pytest.raises(hl.InputFault, match="nothing to advise"):
-        advise.advise("pendulum", (), tmp_path)
+        advise.advise("pendulum", (), Means(tmp_path))
 
 
 @pytest.mark.parametrize(
@@ -81,7 +82,7 @@ def test_what_another_observer_makes_of_the_advice_is_what_its_run_says(
     monkeypatch.setattr(advise, "all_methods", lambda _: [Method("zoh", "own")])
     monkeypatch.setattr(refine_gains, "STEPS", ())
     given = ("duration=0.3", "controller.bias=full", *own)
-    found = advise.advise("closed-loop", given, tmp_path, count=1)
+    found = advise.advise("closed-loop", given, Means(tmp_path), count=1)
     lines = [line for line in found.lines() if advise.OTHER_OBSERVER in line]
     assert len(lines) == told
     if found.kalman:
@@ -98,7 +99,7 @@ def test_the_advice_of_a_scene_is_what_its_runs_say(
     monkeypatch.setattr(refine_gains, "STEPS", (4,))
     given = ("duration=0.5", "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]")
     monkeypatch.setattr(advise, "ROUND", 2)
-    found = advise.advise("closed-loop-direct", given, tmp_path, count=1)
+    found = advise.advise("closed-loop-direct", given, Means(tmp_path), count=1)
     assert found.taken.admitted
     run = hl.run("closed-loop-direct", (*given, *found.taken.method.options), figures=False)
     assert found.taken.error_mm[0] == run.measures().tracking[""].max_mm

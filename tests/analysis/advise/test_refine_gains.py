@@ -13,6 +13,7 @@ from hapticlink.analysis.advise import advise_method as advise
 from hapticlink.analysis.advise.draws import draws
 from hapticlink.analysis.advise.method import Measured, Method
 from hapticlink.analysis.advise.refine_gains import NOTCH, Draws, Refined, refine
+from hapticlink.analysis.sweep.run_sweep import Means
 from hapticlink.orchestrator import open_scene
 
 SCENE = "closed-loop-direct"
@@ -138,7 +139,7 @@ def test_a_scene_gets_gains_beyond_the_sets_that_its_runs_confirm(
         "controller.teleoperation.stiffness=[10.0, 10.0, 0.004]",
         "controller.teleoperation.damping=[4.0, 4.0, 0.002]",
     )
-    found = advise.advise("closed-loop-ideal", given, tmp_path, count=1)
+    found = advise.advise("closed-loop-ideal", given, Means(tmp_path), count=1)
     assert found.gains
     assert gains(found.taken.method)[1] > 2 * 4.0
     (*_, last) = draws(open_scene.load("closed-loop-ideal", given), 3, 0)

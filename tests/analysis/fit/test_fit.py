@@ -73,8 +73,8 @@ def test_a_device_of_which_every_start_is_wrong(log: Log) -> None:
     for estimate in estimates:
         assert abs(estimate.value - truth(estimate)) < max(
             5 * estimate.spread, 0.02 * truth(estimate)
-        ), estimate.line
-        assert estimate.spread < 0.2 * estimate.value, estimate.line
+        ), estimate.text
+        assert estimate.spread < 0.2 * estimate.value, estimate.text
     assert 0.25 < counts < 0.33
 
 
@@ -83,7 +83,7 @@ def test_an_arm_of_which_every_start_is_wrong(log: Log, start: dict[str, Any]) -
     estimates, unexplained = fit_arm(log, ArmHand(target=STILL, **start))
     assert len(estimates) == 15
     for estimate in estimates:
-        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.line
+        assert estimate.value == pytest.approx(truth(estimate), rel=0.04), estimate.text
     assert max(unexplained) < 0.02
 
 
@@ -241,6 +241,12 @@ def test_times_that_are_no_numbers_are_named(log: Log, tmp_path: Path) -> None:
         file["time"], file["haptic_device.x"] = np.zeros((300, 2)), np.zeros((300, 3))
     with pytest.raises(hl.InputFault, match=r"time has a shape of \(2,\) a sample, not \(\)"):
         hl.fit(tmp_path / "log.h5")
+
+
+def test_a_deviation_that_a_log_does_not_tell_is_none_in_json() -> None:
+    lost = Estimate("hand.mass[0]", "kg", 1.0, np.inf, 2.0)
+    assert json.loads(json.dumps(lost.record(), allow_nan=False))["standard_deviation"] is None
+    assert lost.text == "hand.mass[0] = 1 +- unknown kg (assumed 2)"
 
 
 def test_a_gap_and_an_unknown_parameter_are_named(log: Log, tmp_path: Path) -> None:

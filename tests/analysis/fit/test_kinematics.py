@@ -48,12 +48,11 @@ def measured(
 
 def check(fitted: FittedKinematics, errors: dict[tuple[str, int], float]) -> None:
     """Every value that is told is right within five of its standard deviations."""
-    told = 0
-    for u, value, spread in zip(fitted.unknowns, fitted.values, fitted.spreads, strict=True):
-        if np.isfinite(spread):
-            told += 1
-            wanted = u.assumed + errors.get((u.name, u.entry), 0.0)
-            assert abs(value - wanted) < 5 * spread + 1e-9, u.key
+    by_key = {f"{name}[{entry + 1}]": error for (name, entry), error in errors.items()}
+    told = [each for each in fitted.estimates if np.isfinite(each.spread)]
+    for each in told:
+        wanted = each.assumed + by_key.get(each.key, 0.0)
+        assert abs(each.value - wanted) < 5 * each.spread + 1e-9, each.key
     assert told
 
 
@@ -81,13 +80,13 @@ def test_the_twin_tells_its_arms_and_offsets() -> None:
     device, errors = device_of("twin"), errors_of(TWIN_ARMS)
     angles, _ = measured(device, errors, (0.07, 0.07, 1.2), 1500)
     fitted = fit_kinematics(device, angles, known=TWIN_KNOWN)
-    assert fitted.told == len(fitted.unknowns) == 12
+    assert fitted.told == len(fitted.estimates) == 12
     assert not fitted.gauges
     check(fitted, errors)
     before, after = fitted.counts
     assert before > 3 * after
     assert after < 0.3  # what counting alone leaves of four angles with three unknowns is less
-    lengths = [s for u, s in zip(fitted.unknowns, fitted.spreads, strict=True) if u.unit == "m"]
+    lengths = [each.spread for each in fitted.estimates if each.unit == "m"]
     assert max(lengths) < 5e-3
 
 
@@ -96,7 +95,7 @@ def test_what_the_twin_cannot_tell_has_a_name() -> None:
     angles, _ = measured(device, {}, (0.05, 0.05, 0.8), 150)
     fitted = fit_kinematics(device, angles)
     # Eight lengths, four bases, the crank's two ends, four offsets.
-    assert len(fitted.unknowns) == 22
+    assert len(fitted.estimates) == 22
     assert fitted.told == 17
     assert {*fitted.gauges} == {
         "where the device stands", "how it is turned", "its size",
@@ -105,8 +104,7 @@ def test_what_the_twin_cannot_tell_has_a_name() -> None:
     assert fitted.gauges["where the handle is on its body"] == (
         "a_crank.at_child[1]", "loop2.at2[1]",
     )  # fmt: skip
-    assert not [u.key for u, s in zip(fitted.unknowns, fitted.spreads, strict=True)
-                if np.isfinite(s) and u.unit == "m"]  # fmt: skip
+    assert not [e.key for e in fitted.estimates if np.isfinite(e.spread) and e.unit == "m"]
 
 
 KIT = {

@@ -28,7 +28,7 @@ from hapticlink.orchestrator.base.errors import InputFault, Interrupted
 from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.results.read_results import Results, Table
-from hapticlink.orchestrator.results.run_record import Energy
+from hapticlink.orchestrator.results.run_record import ClockSteps, Energy
 from hapticlink.visualization.figures import sweep_figure
 from tests.little_fmus import slave
 from tests.orchestrator.results.records import run_json
@@ -155,6 +155,7 @@ def test_the_numbers_of_a_row(tmp_path: Path) -> None:
     }
     run = run_json(
         fmus=fmus,
+        clocks={name: asdict(ClockSteps(0.01, 0.01, 0.01)) for name in tables},
         holds={"a -> b": "zoh"},
         end={"reason": "stop_when", "time": 1.0},
         energies={"a -> b": asdict(Energy(0.25, 1.0, 0.75, 1.0, 0.5))},
@@ -254,7 +255,7 @@ def test_native_fmus_that_are_there_are_taken_for_the_same_rows(
 
     def rows(cache: str) -> list[row.Row]:
         monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path / cache))
-        found = run_sweep.sweep(made, tmp_path / f"{cache}-sweep", 1)
+        found = run_sweep.sweep(made, run_sweep.Means(tmp_path / f"{cache}-sweep"))
         return [{k: v for k, v in each.items() if k != "run_time_s"} for each in found]
 
     python = rows("python")

@@ -13,6 +13,7 @@ from hapticlink.orchestrator.experiment import simulate
 from hapticlink.orchestrator.results import read_results
 from hapticlink.orchestrator.results.recover import Recovered, recover
 from hapticlink.orchestrator.results.rows_file import RowsBeingWritten, RowsFile, write_empty
+from hapticlink.orchestrator.results.run_results import TableRows
 from hapticlink.orchestrator.results.write_files import FileRecorder
 from tests.little_fmus import python_fmu
 from tests.orchestrator.c_fmus import hostile_fmu
@@ -49,7 +50,8 @@ def test_a_run_that_is_killed_keeps_every_row(tmp_path):
 def test_a_row_that_is_in_part_on_the_disk(tmp_path):
     """The process is killed while it writes a row, or the machine fails before all are written."""
     values = np.zeros(2)
-    recorder = FileRecorder(tmp_path / "haptics.csv", {"a": 0, "b": 1}, values, lambda: None, end=9)
+    rows = TableRows({"a": 0, "b": 1}, values, end=9)
+    recorder = FileRecorder(tmp_path / "haptics.csv", rows, lambda: None)
     recorder.publish()
     for k in range(5):
         values[:] = k, -k

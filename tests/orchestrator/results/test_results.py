@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.results.read_results import read_table
+from hapticlink.orchestrator.results.run_results import TableRows
 from hapticlink.orchestrator.results.write_files import (
     FileRecorder,
     text,
@@ -20,9 +21,8 @@ from hapticlink.orchestrator.results.write_files import (
 
 def recorder_of(path: Path, columns: list[str], view: Any) -> FileRecorder:
     """One whose file is in its place from the first row on."""
-    made = FileRecorder(
-        path, {name: i for i, name in enumerate(columns)}, view, lambda: made.publish(), end=9
-    )
+    rows = TableRows({name: i for i, name in enumerate(columns)}, view, end=9)
+    made = FileRecorder(path, rows, lambda: made.publish())
     return made
 
 

@@ -6,13 +6,14 @@ import weakref
 import numpy as np
 import pytest
 
-from hapticlink.orchestrator.results.run_results import RunResults
+from hapticlink.orchestrator.results.run_results import RunResults, TableRows
 
 
 def run() -> RunResults:
     """Results with a row."""
     results = RunResults()
-    results.recorder("haptics", {"a.x[1]": 0, "a.x[2]": 1}, np.array([1.0, 2.0])).row(0.5)
+    rows = TableRows({"a.x[1]": 0, "a.x[2]": 1}, np.array([1.0, 2.0]))
+    results.recorder("haptics", rows).row(0.5)
     return results
 
 
