@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import groupby, repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +25,7 @@ from hapticlink.orchestrator.base.signal_names import (
     HAND_WRENCH,
     TOPOLOGY_WRENCH,
 )
-from hapticlink.orchestrator.results.read_results import Results, Vector
+from hapticlink.orchestrator.results.read_results import Results, Table, Vector
 from hapticlink.orchestrator.results.recorded_scene import described_devices
 
 WRENCHES = {
@@ -40,14 +41,18 @@ def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
     """Name, times (s), force (N) and moment (N.m), 0 in space, of each wrench that a run has; names
     of further users' wrenches have their point first."""
     space = space_of(results)
+    sizes = space.distance, space.moment
+    found: list[tuple[Table, str, str]] = []
     for user in find_users(results):
-        signals = user.hand, user.drift, user.topology, user.environment
-        for signal, name in zip(signals, WRENCHES.values(), strict=True):
+        own = user.hand, user.drift, user.topology, user.environment
+        for signal, name in zip(own, WRENCHES.values(), strict=True):
             if (table := of_port(results, signal)) and len(table["time"]):
-                force, moment = table.by_row(
-                    lambda F: np.stack([space.distance(F), space.moment(F)]), signal
-                )
-                yield f"{user.name}: {name}" if user.name else name, table["time"], force, moment
+                named = f"{user.name}: {name}" if user.name else name
+                found.append((table, signal, named))
+    for _, each in groupby(found, lambda one: id(one[0])):
+        (table, *_), signals, names = zip(*each, strict=True)
+        rows = table.by_row(lambda *F: np.stack([of(f) for f in F for of in sizes]), *signals)
+        yield from zip(names, repeat(table["time"]), rows[::2], rows[1::2], strict=False)
 
 
 def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:
