@@ -24,8 +24,9 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
     TOPOLOGY_WRENCH,
+    signal_of_user,
 )
-from hapticlink.orchestrator.results.read_results import Results, Table, Vector
+from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import described_devices
 
 WRENCHES = {
@@ -42,13 +43,13 @@ def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
     of further users' wrenches have their point first."""
     space = space_of(results)
     sizes = space.distance, space.moment
-    found: list[tuple[Table, str, str]] = []
-    for user in find_users(results):
-        own = user.hand, user.drift, user.topology, user.environment
-        for signal, name in zip(own, WRENCHES.values(), strict=True):
-            if (table := of_port(results, signal)) and len(table["time"]):
-                named = f"{user.name}: {name}" if user.name else name
-                found.append((table, signal, named))
+    found = [
+        (table, signal, f"{user.name}: {name}" if user.name else name)
+        for user in find_users(results)
+        for first, name in WRENCHES.items()
+        if (table := of_port(results, signal := signal_of_user(first, user.name)))
+        and len(table["time"])
+    ]
     for _, each in groupby(found, lambda one: id(one[0])):
         (table, *_), signals, names = zip(*each, strict=True)
         rows = table.by_row(lambda *F: np.stack([of(f) for f in F for of in sizes]), *signals)

@@ -63,12 +63,9 @@ def _at(times: Vector, known: Vector, series: Vector) -> Vector:
     return series if same else np.interp(times, known, series)
 
 
-Rows = NDArray[np.intp]
-
-
 def work_as_held(
     times: Vector,
-    force_at: Callable[[Rows], Vector],
+    force_at: Callable[[NDArray[np.intp]], Vector],
     known: Vector,
     moved: Table,
     position: str,
@@ -135,11 +132,9 @@ def _signed(sign: float, force: Vector) -> Vector:
     return force if sign == 1.0 else sign * force
 
 
-def absolute_work(results: Results, signal: str, position: str) -> float:
-    """The absolute values (J) of a wrench's work in the steps of a position of the same rate,
+def absolute_work(moved: Table, signal: str, position: str) -> float:
+    """The absolute values (J) of a wrench's work in the steps of a position of the same table,
     summed."""
-    moved = table_of(results, position)
-    assert moved
 
     def steps(block: Table) -> Vector:
         return np.abs(_work(block[signal][:-1], block[position]))
@@ -184,7 +179,7 @@ class Works:
         name = connection or next((each for each in meters if each.startswith(start)), None)
         known = arrivals(results.record, name, table, table is moved) if name else table["time"]
 
-        def force_at(rows: Rows) -> Vector:
+        def force_at(rows: NDArray[np.intp]) -> Vector:
             if not len(rows):
                 return np.zeros((0, *table.shape(signal)))
             first = int(rows.min())

@@ -101,9 +101,8 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     """
     system, seconds = plan.system, plan.system.timeline.seconds
     until, first = pattern_end(system), plan.first_events
-    if until < system.timeline.end or len(first[0]) > min(events, FIRST - 1):
-        first = keyed_events(system.timeline, until, events)
-    ticks, kinds = first
+    are_all = until == system.timeline.end and len(first[0]) <= min(events, FIRST - 1)
+    ticks, kinds = first if are_all else keyed_events(system.timeline, until, events)
     last = int(ticks[-1]) if len(ticks) else 0
     begun = begun if (begun := _pattern_begin(system)) < last else 0
     late = {c.name for c in system.connections if c.latency}
