@@ -83,7 +83,7 @@ def test_every_fmu_is_stepped_without_gap_or_overlap(stamped, timeline, coupling
                 assert reached[operation.fmu] == tick
                 reached[operation.fmu] = tick + operation.dticks
             elif isinstance(operation, Record):
-                rows[operation.clock] += 1
+                rows[operation.table] += 1
     for unit in plan.system.fmus:
         assert (reached[unit.name] > timeline.end) == unit.sampled
     for clock in timeline.clocks:
