@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from itertools import groupby, repeat
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +24,7 @@ from hapticlink.orchestrator.base.signal_names import (
     ENVIRONMENT_WRENCH,
     HAND_WRENCH,
     TOPOLOGY_WRENCH,
+    signal_of_user,
 )
 from hapticlink.orchestrator.results.read_results import Results, Vector
 from hapticlink.orchestrator.results.recorded_scene import described_devices
@@ -40,14 +42,18 @@ def wrenches(results: Results) -> Iterator[tuple[str, Vector, Vector, Vector]]:
     """Name, times (s), force (N) and moment (N.m), 0 in space, of each wrench that a run has; names
     of further users' wrenches have their point first."""
     space = space_of(results)
-    for user in find_users(results):
-        signals = user.hand, user.drift, user.topology, user.environment
-        for signal, name in zip(signals, WRENCHES.values(), strict=True):
-            if (table := of_port(results, signal)) and len(table["time"]):
-                force, moment = table.by_row(
-                    lambda F: np.stack([space.distance(F), space.moment(F)]), signal
-                )
-                yield f"{user.name}: {name}" if user.name else name, table["time"], force, moment
+    sizes = space.distance, space.moment
+    found = [
+        (table, signal, f"{user.name}: {name}" if user.name else name)
+        for user in find_users(results)
+        for first, name in WRENCHES.items()
+        if (table := of_port(results, signal := signal_of_user(first, user.name)))
+        and len(table["time"])
+    ]
+    for _, each in groupby(found, lambda one: id(one[0])):
+        (table, *_), signals, names = zip(*each, strict=True)
+        rows = table.by_row(lambda *F: np.stack([of(f) for f in F for of in sizes]), *signals)
+        yield from zip(names, repeat(table["time"]), rows[::2], rows[1::2], strict=False)
 
 
 def touching(results: Results) -> tuple[Vector, NDArray[np.bool_]] | None:

@@ -73,9 +73,8 @@ class Measures:
     def tracking(self) -> dict[str, TrackingError]:
         """By the users' names; that of the first one is empty."""
         found = {}
-        for user in find_users(self._results):
-            if not has_tracking(self._results, user):
-                continue
+        users = (u for u in find_users(self._results) if has_tracking(self._results, u))
+        for user in users:
             error = pose_error(self._results, user)
             time, mm, rad = (self._within(error.time_s, each) for each in error)
             if len(time):
@@ -86,20 +85,15 @@ class Measures:
     @cached_property
     def forces(self) -> dict[str, float]:
         """The largest force (N) of each wrench."""
-        found = {}
-        for name, time, force, _ in wrenches(self._results):
-            if len(within := self._within(time, force)):
-                found[name] = float(within.max())
-        return found
+        each = ((name, self._within(*sizes)) for name, *sizes, _ in wrenches(self._results))
+        return {name: float(within.max()) for name, within in each if len(within)}
 
     @cached_property
     def motors(self) -> dict[str, float]:
         """The largest motor torque of each user as a share of the torque limit."""
-        found = {}
-        for user, device in all_devices(self._results).items():
-            if driven := motor_loads(self._results, device, UserSignals.of(user)):
-                found[user] = float(self._within(*driven).max(initial=0.0))
-        return found
+        devices = all_devices(self._results).items()
+        loads = ((u, motor_loads(self._results, d, UserSignals.of(u))) for u, d in devices)
+        return {u: float(self._within(*of).max(initial=0.0)) for u, of in loads if of}
 
     @cached_property
     def saturations(self) -> list[Episode]:

@@ -497,18 +497,16 @@ def _start(results: Results) -> Iterator[str]:
         device
         and of_port(results, HANDLE_POSE)
         and len(device["time"])
-        and device[WORKSPACE_MARGIN][0] < 0
+        and device.start[WORKSPACE_MARGIN][0] < 0
         and not results.record.fault
     ):
         point = of_port(results, POINT_POSE)  # which the device may not reach
-        start = point[POINT_POSE][0] if point else device[HANDLE_POSE][0]
+        start = point.start[POINT_POSE][0] if point else device.start[HANDLE_POSE][0]
         yield f"warning: {describe_start_outside(space_of(results), start)}"
     yield from _start_apart(results)
     pulls = of_port(results, HAND_WRENCH)
     if (results.record.scene["hand"] or {}).get("type") == "spring" and pulls:
-        pull = (
-            float(space_of(results).distance(pulls[HAND_WRENCH][0])) if len(pulls["time"]) else 0.0
-        )
+        pull = float(space_of(results).distance(pulls.start[HAND_WRENCH]).max(initial=0.0))
         if pull > PULL:
             yield (
                 f"warning: the hand's spring begins with a pull of {short(pull)} N: begin "
@@ -520,7 +518,7 @@ def _start(results: Results) -> Iterator[str]:
     size = sum(JOINT_TYPES[joint["type"]].size for joint in linkage["joint"])
     table = of_block(results, JOINT_COORDINATES, size)
     if table and len(table["time"]):
-        yield from describe_assembly(linkage, table[JOINT_COORDINATES][0])
+        yield from describe_assembly(linkage, table.start[JOINT_COORDINATES][0])
 
 
 def _start_apart(results: Results) -> Iterator[str]:
@@ -528,7 +526,7 @@ def _start_apart(results: Results) -> Iterator[str]:
     may."""
     handle, point = of_port(results, HANDLE_POSE), of_port(results, POINT_POSE)
     if handle and point and len(handle["time"]) and len(point["time"]):
-        off, space = handle[HANDLE_POSE][0] - point[POINT_POSE][0], space_of(results)
+        off, space = handle.start[HANDLE_POSE][0] - point.start[POINT_POSE][0], space_of(results)
         far, turned = float(space.distance(off)), float(space.angle(off))
         if far > APART or turned > TURNED:
             yield (

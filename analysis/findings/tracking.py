@@ -191,20 +191,19 @@ def pose_error(results: Results, user: UserSignals = FIRST) -> Tracking:
         raise KeyError(f"tracking needs the signals {point} and {handle}")
     if not len(device["time"]):  # a fault before the first row
         return Tracking(*np.zeros((3, 0)))
-    times, known, common = device["time"], device[handle], compared_directions(results, user)
-    space = space_of(results)
+    times, common, space = device["time"], compared_directions(results, user), space_of(results)
+    together = (handle,) if mechanism is device else ()
+    known = None if together else device[handle]
 
-    def error(time: Vector, place: Vector) -> Vector:
-        if mechanism is device and len(time) == len(times):
-            held = known  # to which interpolation would lead
-        else:
-            held = np.column_stack([np.interp(time, times, entry) for entry in known.T])
-        apart = space.difference(place, held)
+    def error(time: Vector, place: Vector, *held: Vector) -> Vector:
+        if known is not None:
+            held = (np.column_stack([np.interp(time, times, entry) for entry in known.T]),)
+        apart = space.difference(place, *held)
         apart = apart if common is None else apart @ common
         return np.stack([space.distance(apart) * 1e3, space.angle(apart)])
 
     rows = rows_until(mechanism, times[-1])
-    distance, angle = mechanism.by_row(error, "time", point)
+    distance, angle = mechanism.by_row(error, "time", point, *together)
     found = [mechanism["time"][rows], distance[rows], angle[rows]]
     if user == FIRST and of_block(results, HELD_POINT) is mechanism:
         found = [each[mechanism[HELD_POINT][rows] > 0] for each in found]

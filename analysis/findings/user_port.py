@@ -113,17 +113,8 @@ def allowance(hand_work: float, whose: str = "the hand") -> str:
 def hand_work(results: Results) -> float:
     """The work (J) of the hands on their handles, its absolute values summed; none of a user whose
     pose or wrench is missing, or has another rate."""
-    total = 0.0
-    for user in find_users(results):
-        moved = of_port(results, user.handle)
-        if moved and user.hand in moved:
-            total += absolute_work(results, user.hand, user.handle)
-    return total
-
-
-def tolerated_in_run(results: Results) -> float:
-    """What is tolerated (J) in a run."""
-    return tolerated_energy(hand_work(results))
+    moved = ((of_port(results, user.handle), user) for user in find_users(results))
+    return sum((absolute_work(t, u.hand, u.handle) for t, u in moved if t and u.hand in t), 0.0)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged

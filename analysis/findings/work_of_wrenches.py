@@ -49,15 +49,12 @@ def _draw_delays(record: RunRecord, connection: str, samples: int) -> Vector | N
     return np.concatenate([[0.0], late])
 
 
-def _sums(rows: int, steps: Callable[[Table], Vector], table: Table) -> Vector:
-    """The sums of a table's steps between rows up to each of these."""
-    sums, done = np.zeros(rows), 0
-    for block in table.blocks(more=1):
-        found = steps(block)
-        sums[done + 1 : done + 1 + len(found)] = found
-        done += len(found)
-    np.cumsum(sums[1:], out=sums[1:])
-    return sums
+def _sums(steps: Callable[[Table], Vector], table: Table) -> Vector:
+    """The sums of a table's steps between rows, (..., n), up to each of these."""
+    sums = np.concatenate([steps(block) for block in table.blocks(more=1)], axis=-1)
+    np.cumsum(sums, axis=-1, out=sums)
+    begin = np.zeros((*sums.shape[:-1], 1))
+    return np.concatenate([begin, sums], axis=-1)[..., : len(table.rows)]
 
 
 def _at(times: Vector, known: Vector, series: Vector) -> Vector:
@@ -66,12 +63,9 @@ def _at(times: Vector, known: Vector, series: Vector) -> Vector:
     return series if same else np.interp(times, known, series)
 
 
-Rows = NDArray[np.intp] | slice
-
-
 def work_as_held(
     times: Vector,
-    force_at: Callable[[Rows], Vector],
+    force_at: Callable[[NDArray[np.intp]], Vector],
     known: Vector,
     moved: Table,
     position: str,
@@ -84,19 +78,13 @@ def work_as_held(
         order = np.argsort(known, kind="stable")
         known, newest = known[order], np.maximum.accumulate(order)
 
-    def rows_of(block: Table) -> Rows:
-        if known is block["time"] and (known[1:] - known[:-1] > SAME_S).all():
-            return slice(0, len(known) - 1)
+    def steps(block: Table) -> Vector:
         rows = np.searchsorted(known, block["time"][:-1] + SAME_S, "right") - 1
         rows = np.maximum(rows, 0)
-        return rows if newest is None else newest[rows]
+        force = force_at(rows if newest is None else newest[rows])
+        return _work(force, block[position])
 
-    def steps(block: Table) -> Vector:
-        place = block[position]
-        work: Vector = (force_at(rows_of(block)) * (place[1:] - place[:-1])).sum(axis=1)
-        return work
-
-    return _at(times, moved["time"], _sums(len(moved.rows), steps, moved))
+    return _at(times, moved["time"], _sums(steps, moved))
 
 
 def work_of_source(
@@ -112,29 +100,46 @@ def work_of_source(
         else:
             path, place = elsewhere
             at_stamps = np.stack([np.interp(block["time"], path, x) for x in place.T], axis=1)
-        force = _signed(sign, block[signal])
-        mean = (force[:-1] + force[1:]) / 2
-        work: Vector = (mean * (at_stamps[1:] - at_stamps[:-1])).sum(axis=1)
-        return work
+        return _work(_mean(_signed(sign, block[signal])), at_stamps)
 
-    return _at(times, wrench["time"], _sums(len(wrench.rows), steps, wrench))
+    return _at(times, wrench["time"], _sums(steps, wrench))
+
+
+def _of_one_table(
+    times: Vector, table: Table, signal: str, position: str, sign: float
+) -> tuple[Vector, Vector]:
+    """As `work_as_held` and `work_of_source`, of samples that act from their stamps on."""
+
+    def steps(block: Table) -> Vector:
+        force, place = _signed(sign, block[signal]), block[position]
+        return np.stack([_work(force[:-1], place), _work(_mean(force), place)])
+
+    acts, source = _sums(steps, table)
+    return _at(times, table["time"], acts), _at(times, table["time"], source)
+
+
+def _work(force: Vector, place: Vector) -> Vector:
+    """The work of a force in each step from one place to the next."""
+    work: Vector = (force * (place[1:] - place[:-1])).sum(axis=1)
+    return work
+
+
+def _mean(force: Vector) -> Vector:
+    return (force[:-1] + force[1:]) / 2
 
 
 def _signed(sign: float, force: Vector) -> Vector:
     return force if sign == 1.0 else sign * force
 
 
-def absolute_work(results: Results, signal: str, position: str) -> float:
-    """The absolute values (J) of a wrench's work in the steps of a position of the same rate,
+def absolute_work(moved: Table, signal: str, position: str) -> float:
+    """The absolute values (J) of a wrench's work in the steps of a position of the same table,
     summed."""
-    moved = table_of(results, position)
-    assert moved
 
     def steps(block: Table) -> Vector:
-        return np.abs((block[signal][:-1] * np.diff(block[position], axis=0)).sum(axis=1))
+        return np.abs(_work(block[signal][:-1], block[position]))
 
-    sums = _sums(len(moved.rows), steps, moved)
-    return float(sums[-1]) if len(sums) else 0.0
+    return last(_sums(steps, moved))
 
 
 def _passing(series: Vector, times: Vector, at: int, value: float) -> Vector:
@@ -174,9 +179,7 @@ class Works:
         name = connection or next((each for each in meters if each.startswith(start)), None)
         known = arrivals(results.record, name, table, table is moved) if name else table["time"]
 
-        def force_at(rows: Rows) -> Vector:
-            if isinstance(rows, slice):
-                return _signed(sign, table[signal][rows])
+        def force_at(rows: NDArray[np.intp]) -> Vector:
             if not len(rows):
                 return np.zeros((0, *table.shape(signal)))
             first = int(rows.min())
@@ -188,11 +191,13 @@ class Works:
         at = int(np.searchsorted(times, meter.until)) if meter else 0
         if between := meter and not (at < len(times) and times[at] == meter.until):
             times = np.insert(times, at, meter.until)
-        acts = work_as_held(times, force_at, known, moved, position)
+        if moved is table and known is table["time"] and (np.diff(known) > SAME_S).all():
+            acts, source = _of_one_table(times, table, signal, position, sign)
+        else:
+            acts = work_as_held(times, force_at, known, moved, position)
+            source = work_of_source(times, table, signal, moved, position, sign)
         if meter:
             acts = _passing(acts, times, at, meter.held)
-        source = work_of_source(times, table, signal, moved, position, sign)
-        if meter:
             source = _passing(source, times, at, meter.ideal)
         if between:
             acts, source = np.delete(acts, at), np.delete(source, at)

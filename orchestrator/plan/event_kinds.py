@@ -15,11 +15,11 @@ from hapticlink.orchestrator.base.ticks import Timeline
 from hapticlink.orchestrator.plan.operations import Event, Firing
 
 Ticks = NDArray[np.int64]
+KeyedEvents = tuple[Ticks, dict[Event, NDArray[np.intp]]]
+"""Ticks of events, and the indices of those of each kind."""
 
 
-def keyed_events(
-    timeline: Timeline, until: int, most: int
-) -> tuple[Ticks, dict[Event, NDArray[np.intp]]]:
+def keyed_events(timeline: Timeline, until: int, most: int) -> KeyedEvents:
     """The ticks of the events up to `until`, `most` of them, and the indices of those of each kind,
     which are in the order of their first occurrence."""
     every = [clock.starts for clock in timeline.clocks]

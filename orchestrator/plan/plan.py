@@ -10,6 +10,7 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
@@ -17,6 +18,7 @@ from hapticlink.orchestrator.base.errors import InputFault, shorten
 from hapticlink.orchestrator.base.ticks import Clock, Timeline
 from hapticlink.orchestrator.plan import dependency_order
 from hapticlink.orchestrator.plan.dependency_order import AlgebraicLoop
+from hapticlink.orchestrator.plan.event_kinds import KeyedEvents, keyed_events
 from hapticlink.orchestrator.plan.operations import (
     Event,
     Firing,
@@ -29,6 +31,8 @@ from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.system.system import System
 
 Block = tuple[Operation, ...]
+FIRST = 4096
+"""Events whose kinds are known before a run."""
 EXACT = 2**53
 """Up to here every whole number is a double, and the quotient of two is rounded once."""
 
@@ -57,6 +61,11 @@ class Plan:
                 raise InputFault(f"coupling = {coupling!r}: {what} is no tuple of operations")
             self._blocks[kind] = block
         return self._blocks[kind]
+
+    @cached_property
+    def first_events(self) -> KeyedEvents:
+        """The first events of a run, FIRST at most."""
+        return keyed_events(self.system.timeline, self.system.timeline.end, FIRST)
 
     def of(self, system: System) -> Plan:
         """The same plan of a system that differs in start values alone."""

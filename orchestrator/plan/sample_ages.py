@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hapticlink.orchestrator.base.ticks import exact
 from hapticlink.orchestrator.plan.event_kinds import keyed_events
 from hapticlink.orchestrator.plan.operations import Event, Place, Stamp
-from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.plan import FIRST, Plan
 from hapticlink.orchestrator.system.latency_and_loss import SampleLink
 from hapticlink.orchestrator.system.system import System
 
@@ -100,58 +100,69 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     end before it.
     """
     system, seconds = plan.system, plan.system.timeline.seconds
-    ticks, kinds = keyed_events(system.timeline, pattern_end(system), events)
+    until, first = pattern_end(system), plan.first_events
+    are_all = until == system.timeline.end and len(first[0]) <= min(events, FIRST - 1)
+    ticks, kinds = first if are_all else keyed_events(system.timeline, until, events)
     last = int(ticks[-1]) if len(ticks) else 0
     begun = begun if (begun := _pattern_begin(system)) < last else 0
-    found: dict[str, list[NDArray[np.int64]]] = {}
     late = {c.name for c in system.connections if c.latency}
-    for connection, at, ages in _ages(plan, ticks, kinds):
-        if connection not in late:
-            found.setdefault(connection, []).append(ages[at > begun])
+    found = {name: ages for name, ages in _ages(plan, ticks, kinds, begun) if name not in late}
+    drawn: dict[str, list[int]] = defaultdict(list)
     for tick, connection, stamp in uses(plan, last, late) if late and last else ():
         if tick > begun:
-            found.setdefault(connection, []).append(np.array([tick - stamp]))
-    parts = {name: np.concatenate(each) for name, each in found.items()}
-    joined = {name: each for name, each in parts.items() if len(each)}
-    return {
-        name: Delay(seconds(int(a.min())), seconds(int(a.max())), seconds(int(a.sum())) / len(a))
-        for name, a in joined.items()
+            drawn[connection].append(tick - stamp)
+    found |= {name: np.array(ages) for name, ages in drawn.items()}
+    each = {id(a): a for a in found.values() if len(a)}
+    told = {
+        i: Delay(seconds(int(a.min())), seconds(int(a.max())), seconds(int(a.sum())) / len(a))
+        for i, a in each.items()
     }
+    return {name: told[id(a)] for name, a in found.items() if id(a) in told}
+
+
+Left = tuple[tuple[int, Stamp], ...]
+"""The stamps that kinds of events, by number, leave in a place."""
 
 
 def _ages(
-    plan: Plan, ticks: NDArray[np.int64], kinds: Mapping[Event, NDArray[np.intp]]
-) -> Iterator[tuple[str, NDArray[np.int64], NDArray[np.int64]]]:
-    """By connection, in events of each kind, the ticks at which its inputs are set and their ages
-    (ticks): what these leave in the places is found once a kind, and goes on from event to event
-    for all of them at once. Without latencies, of which each sample has its own."""
-    left: dict[Place, dict[Event, Stamp]] = {}
-    used: dict[Event, list[tuple[str, Stamp]]] = {}
-    for kind in kinds:
+    plan: Plan, ticks: NDArray[np.int64], kinds: Mapping[Event, NDArray[np.intp]], begun: int
+) -> Iterator[tuple[str, NDArray[np.int64]]]:
+    """By connection the ages (ticks) of its inputs in the events after a tick: what each kind of
+    event leaves in the places is found once, and goes on from event to event for all of them at
+    once; one array for all connections of the same ages. Without latencies, of which each sample
+    has its own."""
+    left: dict[Place, Left] = defaultdict(tuple)
+    used: dict[str, list[tuple[int, Stamp]]] = {}
+    for number, kind in enumerate(kinds):
         now: dict[Place, Stamp] = {}
-        used[kind] = []
         for place, stamp in _stamps(plan, kind):
             now[place] = stamp if isinstance(stamp, int) else now.get(stamp, stamp)
-            if place[0] == "input":
-                used[kind].append((place[1], now[place]))
+            if place[0] == "input" and not kind.first:
+                used.setdefault(place[1], []).append((number, now[place]))
         for place, stamp in now.items():
-            left.setdefault(place, {})[kind] = stamp
+            left[place] += ((number, stamp),)
+    rows_of = [*kinds.values()]
+    counted = [rows[ticks[rows] > begun] for rows in rows_of]
 
     @cache
-    def before(place: Place) -> NDArray[np.int64]:
+    def before(places: Left) -> NDArray[np.int64]:
         after, newest = np.zeros(len(ticks) + 1, np.int64), np.zeros(len(ticks) + 1, np.intp)
-        for kind, stamp in left.get(place, {}).items():
-            after[kinds[kind] + 1] = of(stamp, kinds[kind])
-            newest[kinds[kind] + 1] = kinds[kind] + 1
+        for number, stamp in places:
+            rows = rows_of[number]
+            after[rows + 1] = of(stamp if isinstance(stamp, int) else left[stamp], rows)
+            newest[rows + 1] = rows + 1
         stamps: NDArray[np.int64] = after[np.maximum.accumulate(newest)]
         return stamps
 
-    def of(stamp: Stamp, rows: NDArray[np.intp]) -> NDArray[np.int64]:
+    def of(stamp: int | Left, rows: NDArray[np.intp]) -> NDArray[np.int64]:
         return ticks[rows] + stamp if isinstance(stamp, int) else before(stamp)[rows]
 
-    for kind, rows in kinds.items():
-        for connection, stamp in () if kind.first else used[kind]:
-            yield connection, ticks[rows], ticks[rows] - of(stamp, rows)
+    @cache
+    def ages(*each: tuple[int, int | Left]) -> NDArray[np.int64]:
+        return np.concatenate([ticks[counted[i]] - of(stamp, counted[i]) for i, stamp in each])
+
+    for name, each in used.items():
+        yield name, ages(*((i, s if isinstance(s, int) else left[s]) for i, s in each))
 
 
 def pattern_end(system: System) -> int:

@@ -103,6 +103,11 @@ class Table(Mapping[str, Vector]):
         vars(part).update(_places=self._places, _arrays=self._arrays)
         return part
 
+    @property
+    def start(self) -> Table:
+        """The table of the first row."""
+        return self.part(slice(1))
+
     def by_row(self, of_rows: Callable[..., Vector], *names: str) -> Vector:
         """What a function gives for the rows of signals, (k, ...) -> (k,) or (n, k). Of a long run
         only the result is in memory."""

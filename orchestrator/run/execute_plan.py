@@ -158,7 +158,7 @@ class _Run:
         memory = StartMemory(simulation) if keeps else None
         simulation.rows_before = state.content["rows"] if state else {}
         simulation.start()
-        coming = loop.events.coming()
+        coming = plan.first_events[1]
         loop.events.prepare(real_time.kinds(coming) if real_time else coming)
         if state:
             run_state.restore(state, simulation, loop)

@@ -24,6 +24,8 @@ def read_recorded(fmu: Fmu, record: RecordTable, connections: Iterable[Connectio
     locals, inputs, parameters. What only an active clock lets be read is not. A text is recorded
     where it is named, an output, too."""
     patterns = () if isinstance(record.signals, str) else record.signals
+    if not patterns:
+        return with_texts(fmu, connections, set())
 
     def is_named(s: Scalar) -> bool:
         can_be = not s.clocks and s.causality != "independent"

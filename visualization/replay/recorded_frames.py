@@ -23,7 +23,7 @@ from hapticlink.analysis.findings.tracking import (
     of_block,
     table_of,
 )
-from hapticlink.analysis.findings.user_port import tolerated_in_run, user_port
+from hapticlink.analysis.findings.user_port import tolerated_energy, user_port
 from hapticlink.components.specs.contacts import Contacts
 from hapticlink.components.specs.device import Device
 from hapticlink.components.specs.linkage import Linkage
@@ -104,7 +104,7 @@ class Recorded:
 
     def frames(self) -> list[dict[str, Any]]:
         """The frames as the live page gets them, without their time and what is not finite."""
-        values, port, most = self.values(), user_port(self.results), tolerated_in_run(self.results)
+        values, port = self.values(), user_port(self.results)
         energy = np.interp(self.times, port.time_s, port.generated_J) if port else None
         made = []
         for i in range(len(self.times)):
@@ -113,7 +113,7 @@ class Recorded:
             if energy is not None and np.isfinite(energy[i]):
                 frame["energy"] = {PORT: float(energy[i])}
             made.append(drawn := self.picture.drawn(frame))
-            if energy is not None and energy[i] > most:
+            if energy is not None and port and energy[i] > tolerated_energy(port.hand_work_J):
                 drawn["states"].append("energy")
         return made
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan.event_kinds import event, key_of, keyed_events
+from hapticlink.orchestrator.plan.event_kinds import event, key_of
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import Delay, delays
@@ -187,12 +187,8 @@ class Events:
     def _new_kind(self) -> None:
         self.prepare([event(self._timeline, self._key.tobytes())])
 
-    def coming(self) -> Iterable[Event]:
-        """The kinds of the first events, in the order of their first occurrence."""
-        return keyed_events(self._timeline, self._timeline.end, WINDOW)[1]
-
     def prepare(self, kinds: Iterable[Event]) -> None:
-        """Add the operations of kinds of events, those of `coming` before they occur."""
+        """Add the operations of kinds of events, before they occur."""
         self._kinds |= {kind: self._block(kind) for kind in kinds}
         self._machine.publish()
         keys = [key_of(self._timeline, kind) for kind in self._kinds]
@@ -226,7 +222,7 @@ class CompiledLoop:
         self._machine.forget_operations()
         self._machine.begin_again()
         self._take(plan)
-        self.events.prepare(self.events.coming())
+        self.events.prepare(plan.first_events[1])
 
     def goes_with(self, other: CompiledLoop) -> bool:
         """Whether both have the same operations, under the same numbers."""
