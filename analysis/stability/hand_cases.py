@@ -234,12 +234,14 @@ def in_poses(
     bounds: Bounds,
     begin: Callable[[str], object] = lambda pose: None,
     work: SharedWork | None = None,
-) -> tuple[list[Case], dict[str, str]]:
-    """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
+) -> tuple[list[Case], list[Pose], dict[str, str]]:
+    """The cases in all poses, each of which `begin` is told, the poses that have some, of those of
+    one name the first, and by pose why it has none."""
     cases: list[Case] = []
+    judged: list[Pose] = []
     without: dict[str, str] = {}
     for pose in poses:
-        if any(case.pose == pose.name for case in cases):
+        if any(other.name == pose.name for other in judged):
             continue
         begin(pose.name)
         try:
@@ -258,8 +260,9 @@ def in_poses(
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
         else:
+            judged.append(pose)
             without.pop(pose.name, None)
-    return cases, without
+    return cases, judged, without
 
 
 def is_saturated(read: Scene, place: RestingScene) -> bool:

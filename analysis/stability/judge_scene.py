@@ -219,7 +219,7 @@ def _judge(
     visited, _ = visits(read)
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
-        cases, without = in_poses(
+        cases, judged, without = in_poses(
             read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
         )
         if not cases:
@@ -227,7 +227,7 @@ def _judge(
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            pose = next(pose for pose in visited if pose.name == worst.pose)
+            pose = next(pose for pose in judged if pose.name == worst.pose)
             if pose.leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
@@ -236,7 +236,6 @@ def _judge(
         near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
-        judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
         hardest = hardest_first(cases)
         margin, remedies = improvements(
             read, judged, held, bounds, worst, visits, hardest, work, steps

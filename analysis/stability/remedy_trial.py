@@ -110,7 +110,7 @@ class Trial:
                 yield
 
     def _judge_in(self, pose: Pose) -> None:
-        found, why = in_poses(
+        found, _, why = in_poses(
             self._changed, [pose], self._hands, self._bounds, self._tell, self._work
         )
         self._cases += found

@@ -154,6 +154,19 @@ def assert_matches(pattern: str, text: str) -> None:
         raise ValueError(text)
 
 
+def test_a_board_that_is_gone_is_not_said_to_be_at_rest(port, tmp_path):
+    write = port.write
+
+    def unplugged(message: bytes) -> None:
+        if port.firmware.messages > 20:
+            raise OSError(5, "Input/output error")
+        write(message)
+
+    port.write = unplugged
+    told = str(ran(port, tmp_path).outcome.fault)
+    assert "Input/output error: torques may be on: switch the motors off" in told
+
+
 def test_a_turn_that_fails_leaves_no_torque(port, tmp_path):
     def turn(simulation: object, loop: object) -> None:
         if port.firmware.messages > 20:
