@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7505,
+    "components": 7506,
     "fmus": 2997,
-    "orchestrator": 16838,
+    "orchestrator": 16848,
     "programs": 1045,
-    "analysis": 9172,
-    "visualization": 3856,
+    "analysis": 9198,
+    "visualization": 3859,
     "api": 641,
     "commands": 1638,
 }

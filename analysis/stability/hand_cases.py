@@ -232,18 +232,16 @@ def in_poses(
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
-    begin: Callable[[str], object] = lambda pose: None,
+    begin: Callable[[Pose], object] = lambda pose: None,
     work: SharedWork | None = None,
-) -> tuple[list[Case], list[Pose], dict[str, str]]:
-    """The cases in all poses, each of which `begin` is told, the poses that have some, of those of
-    one name the first, and by pose why it has none."""
+) -> tuple[list[Case], dict[str, str]]:
+    """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
     cases: list[Case] = []
-    judged: list[Pose] = []
     without: dict[str, str] = {}
     for pose in poses:
-        if any(other.name == pose.name for other in judged):
+        if any(case.pose == pose.name for case in cases):
             continue
-        begin(pose.name)
+        begin(pose)
         try:
             with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
                 # A constant wrench slides off what it presses on, whatever the loop does.
@@ -260,9 +258,8 @@ def in_poses(
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
         else:
-            judged.append(pose)
             without.pop(pose.name, None)
-    return cases, judged, without
+    return cases, without
 
 
 def is_saturated(read: Scene, place: RestingScene) -> bool:

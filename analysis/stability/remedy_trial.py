@@ -110,8 +110,13 @@ class Trial:
                 yield
 
     def _judge_in(self, pose: Pose) -> None:
-        found, _, why = in_poses(
-            self._changed, [pose], self._hands, self._bounds, self._tell, self._work
+        found, why = in_poses(
+            self._changed,
+            [pose],
+            self._hands,
+            self._bounds,
+            lambda at: self._tell(at.name),
+            self._work,
         )
         self._cases += found
         self._without.pop(pose.name, None)

@@ -148,7 +148,7 @@ def test_the_command_reads_a_log(tmp_path, capsys) -> None:
 def test_a_log_that_tells_too_little_is_refused() -> None:
     device = device_of("twin")
     angles, _ = measured(device, {}, (1e-3, 1e-3, 0.02), 40)
-    with pytest.raises(hl.InputFault, match="the log tells too little.*through its workspace"):
+    with pytest.raises(hl.InputFault, match=r"the log tells too little.*through its workspace"):
         fit_kinematics(device, angles, known=["a_left.at_parent"])
 
 
