@@ -20,6 +20,7 @@ from hapticlink.analysis.findings.tracking import (
     UserSignals,
     compares_angles,
     find_handle,
+    of_any_shape,
     of_block,
     of_port,
     space_of,
@@ -28,6 +29,7 @@ from hapticlink.analysis.findings.user_port import allowance, find_other_pushes,
 from hapticlink.components.specs.joint_types import JOINT_TYPES
 from hapticlink.orchestrator.base.plain_data import plain
 from hapticlink.orchestrator.base.signal_names import (
+    APPLIED_TORQUES,
     CLOSURE_ERROR,
     CONSTRAINT_COUNTS,
     CONTACT_GAP,
@@ -41,6 +43,7 @@ from hapticlink.orchestrator.base.signal_names import (
     MECHANISM,
     MECHANISM_ENERGY,
     MECHANISM_STOPS,
+    MOTOR_TORQUES,
     MOTOR_WRENCH,
     POINT_POSE,
     WORKSPACE_MARGIN,
@@ -215,6 +218,19 @@ def _describe_saturation(measures: Measures) -> Iterator[str]:
             yield f"{said} for {short(seconds)} s: the hand felt less than the controller asked for"
 
 
+def _describe_limited(results: Results) -> Iterator[str]:
+    """A line where a board was sent less torque than the motor map gave over the step before."""
+    asked, sent = (of_any_shape(results, port) for port in (MOTOR_TORQUES, APPLIED_TORQUES))
+    if asked is None or sent is None:
+        return
+    ticks = np.abs(sent[APPLIED_TORQUES][1:]) < np.abs(asked[MOTOR_TORQUES][:-1])
+    if n := int(ticks.any(axis=1).sum()):
+        yield (
+            f"at {n} of {len(ticks)} ticks the board was sent less torque than was asked for: its "
+            "[device.driver] limits it (torque_limit, torque_rate)"
+        )
+
+
 def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
     """One line for each warning, which begins so, and for each note: start poses, folded copy,
     signals that are not recorded, held outputs, repeated steps, contacts, convergence, lost
@@ -247,6 +263,7 @@ def lines(results: Results, measures: Measures | None = None) -> Iterator[str]:
             "the handle is told where the observer sees it: where a board's is, and the work of "
             "the hand on it, nobody knows"
         )
+        yield from _describe_limited(results)
     yield from describe_unrecorded(record.not_recorded, record.fmus)
     if (every := record.scene["record"]["every"]) > 1:
         yield (

@@ -21,10 +21,10 @@ def lines(device: Device, start: Pose) -> Iterator[str]:
     the start pose of a scene is inside the workspace."""
     if device.handle.along is not None:
         (extent,) = extents_along(device)
-        yield f"along {write_pose(device.handle.along)}: {_range(extent)} m"
+        yield f"along {write_pose(device.handle.along)}: {_range(extent)}"
     elif not any(device.space.turns):
         named = zip(device.space.names, extents_along(device), strict=True)
-        along = ", ".join(f"{name} {_range(extent)} m" for name, extent in named)
+        along = ", ".join(f"{name} {_range(extent)}" for name, extent in named)
         yield f"on lines through the device's start: {along}"
     else:
         yield from _extents(device)
@@ -43,11 +43,13 @@ def _extents(device: Device) -> Iterator[str]:
     fields = {"at some theta: ": space.some, "at every theta: ": space.every}
     for which, field in fields.items() if len(space.theta) > 1 else [("", space.some)]:
         extent = space.extent(field)
-        where = f"x {_range(extent[0])} m, y {_range(extent[1])} m" if extent else "nowhere"
+        where = f"x {_range(extent[0])}, y {_range(extent[1])}" if extent else "nowhere"
         yield f"{which}{where}"
     if len(space.theta) > 1:
-        turns = space.turns
-        yield f"theta: {'any' if turns == [_TURN] else ', '.join(map(_range, turns)) + ' rad'}"
+        turns = (
+            "any" if space.turns == [_TURN] else ", ".join(_range(t, "rad") for t in space.turns)
+        )
+        yield f"theta: {turns}"
 
 
 def write_pose(pose: Pose) -> str:
@@ -58,5 +60,5 @@ def write_pose(pose: Pose) -> str:
 _TURN = (-math.pi, math.pi)
 
 
-def _range(of: Range) -> str:
-    return f"{of[0]:.2g} to {of[1]:.2g}"
+def _range(of: Range | None, unit: str = "m") -> str:
+    return f"{of[0]:.2g} to {of[1]:.2g} {unit}" if of else "nowhere"

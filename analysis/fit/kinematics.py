@@ -105,22 +105,15 @@ def fit_kinematics(
     step = max(len(angles) // SAMPLES, 1)
     taken = angles[::step]
     at = None if places is None else places[::step]
-    z = problem.first_places(taken)
-    theta = problem.assumed
-    first = np.inf
-    for _ in range(STEPS):
-        z = problem.nearest(theta, z, taken, at)
+    try:
+        theta, z, first = problem.searched(taken, at)
         A, r, counts = problem.projected(theta, z, taken, at)
-        first = counts if first == np.inf else first
-        U, s, Vt = np.linalg.svd(A, full_matrices=False)
-        kept = s > NONE * max(s.max(initial=0.0), 1e-300)
-        move = -(Vt[kept].T / s[kept]) @ (U.T[kept] @ r)
-        theta = theta + problem.scales * move
-        if np.abs(move).max(initial=0.0) < STILL:
-            break
-    z = problem.nearest(theta, z, taken, at)
-    A, r, counts = problem.projected(theta, z, taken, at)
-    _, s, Vt = np.linalg.svd(A)
+        _, s, Vt = np.linalg.svd(A)
+    except np.linalg.LinAlgError:
+        raise InputFault(
+            "the search for its kinematics leads nowhere: the log tells too little of them. Let "
+            "the handle go through its workspace, or give more of them as known (--known NAME,...)"
+        ) from None
     rank = int(np.count_nonzero(s > NONE * max(s.max(initial=0.0), 1e-300)))
     if not rank or s.max(initial=0.0) < NONE:
         raise InputFault(
@@ -218,6 +211,23 @@ class _Problem:
             Jt = Jz.transpose(0, 2, 1)
             z = z - np.linalg.solve(Jt @ Jz, Jt @ r[:, :, None])[:, :, 0]
         return z
+
+    def searched(self, angles: Matrix, places: Matrix | None) -> tuple[Vector, Matrix, float]:
+        """Theta, the places that fit best with it, and the errors at the encoders before. Raises
+        LinAlgError where the search does not converge."""
+        theta, z = self.assumed, self.first_places(angles)
+        first = np.inf
+        for _ in range(STEPS):
+            z = self.nearest(theta, z, angles, places)
+            A, r, counts = self.projected(theta, z, angles, places)
+            first = counts if first == np.inf else first
+            U, s, Vt = np.linalg.svd(A, full_matrices=False)
+            kept = s > NONE * max(s.max(initial=0.0), 1e-300)
+            move = -(Vt[kept].T / s[kept]) @ (U.T[kept] @ r)
+            theta = theta + self.scales * move
+            if np.abs(move).max(initial=0.0) < STILL:
+                return theta, self.nearest(theta, z, angles, places), first
+        raise np.linalg.LinAlgError
 
     def projected(
         self, theta: Vector, z: Matrix, angles: Matrix, places: Matrix | None

@@ -232,7 +232,7 @@ def in_poses(
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
-    begin: Callable[[str], object] = lambda pose: None,
+    begin: Callable[[Pose], object] = lambda pose: None,
     work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
     """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
@@ -241,7 +241,7 @@ def in_poses(
     for pose in poses:
         if any(case.pose == pose.name for case in cases):
             continue
-        begin(pose.name)
+        begin(pose)
         try:
             with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
                 # A constant wrench slides off what it presses on, whatever the loop does.

@@ -218,17 +218,20 @@ def _judge(
     """The verdict in the poses of `visits`, which are found again for a remedy."""
     visited, _ = visits(read)
     steps.expected += len(visited) + len(MARGINS)
+    tried: dict[str, Pose] = {}  # of several of one name the last one, which has the cases
+
+    def begin(pose: Pose) -> None:
+        tried[pose.name] = pose
+        steps.begin(f"pose at {pose.name}")
+
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
-        cases, without = in_poses(
-            read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
-        )
+        cases, without = in_poses(read, visited, hands, bounds, begin, work)
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            pose = next(pose for pose in visited if pose.name == worst.pose)
-            if pose.leaves(read, hands[worst.hand]):
+            if tried[worst.pose].leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
             worst = worst_case(cases)
@@ -236,7 +239,7 @@ def _judge(
         near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
-        judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
+        judged = [tried[name] for name in dict.fromkeys(case.pose for case in cases)]
         hardest = hardest_first(cases)
         margin, remedies = improvements(
             read, judged, held, bounds, worst, visits, hardest, work, steps

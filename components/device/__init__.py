@@ -1,1 +1,1 @@
-"""The haptic device: twin pantograph, encoders, observer."""
+"""The haptic device: a linkage with motors and encoders, and its observer."""

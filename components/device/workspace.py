@@ -191,19 +191,20 @@ def _reach(device: Device) -> tuple[Field, float]:
             return np.array(point or (0.0, 0.0)), max(reach, 1e-3)
 
 
-def extents_along(device: Device) -> list[Range]:
+def extents_along(device: Device) -> list[Range | None]:
     """The first and the last coordinate (m) along each direction that the device renders, the
-    others as at its start."""
+    others as at its start; None where it has none."""
     from scipy.ndimage import label  # slow to load
 
     model, (_, reach) = device_model(device), _reach(device)
     ways = np.linspace(-reach, reach, POINTS)
-    start, found = model.start_pose, list[Range]()
+    start, found = model.start_pose, list[Range | None]()
     for along in np.array(model.directions.rows):
         margins = margin(device, start + np.outer(ways, along))
         parts, _ = label(margins >= 0)
         own = parts == parts[POINTS // 2]  # not where the device is assembled otherwise
-        found.append(_ends(along @ start + ways, np.where((margins < 0) | own, margins, -np.inf)))
+        margins = np.where((margins < 0) | own, margins, -np.inf)
+        found.append(_ends(along @ start + ways, margins) if margins.max() >= 0 else None)
     return found
 
 

@@ -98,6 +98,8 @@ class Board(Instance):
         self._sent_at = self._began = self._measured_at = 0.0
         self._applied = self.safe.sent
         self._stepped = self._rests = False
+        self._told = False
+        """Whether zero torque, when it was sent last, could be written to the port."""
         self._stack = ExitStack()
         self.workers = "normal"
         """The priority of the kernel's workers that pass on the bytes of a serial port."""
@@ -166,7 +168,7 @@ class Board(Instance):
             if words := driver.zero_torque_when_killed():
                 self.workers = self._stack.enter_context(write_if_killed(*words))
         except (Silent, OSError) as error:
-            raise self._fault(f"the board at {self._table.port} {_told(error)}", 0.0) from None
+            raise self._fault(f"the board at {self._table.port} {_words(error)}", 0.0) from None
         self._driver = driver
         interrupt.add(self.rest)
         self._stack.callback(interrupt.remove, self.rest)
@@ -221,7 +223,7 @@ class Board(Instance):
         try:
             self._driver.send(torques)
         except OSError as error:
-            raise self._stopped(f"the board at {self._table.port} {_told(error)}") from None
+            raise self._stopped(f"the board at {self._table.port} {_words(error)}") from None
         self._applied = [*torques]
 
     def _answer(self) -> Vector:
@@ -230,7 +232,7 @@ class Board(Instance):
         try:
             return np.array(self._driver.receive(self._table.silence))
         except (Silent, OSError) as error:
-            raise self._stopped(f"the board at {self._table.port} {_told(error)}") from None
+            raise self._stopped(f"the board at {self._table.port} {_words(error)}") from None
 
     def _receive(self) -> None:
         """Take over the answer to what was sent last. Raises FmuFault."""
@@ -258,9 +260,10 @@ class Board(Instance):
                 self.outputs[places] = value
 
     def _stopped(self, what: str) -> FmuFault:
-        """The fault, with zero torque."""
+        """The fault, with zero torque, as far as the board can be told."""
         self.rest()
-        return self._fault(f"{what}: torques are zero", self.time)
+        end = "are zero" if self._told else "may be on: switch the motors off"
+        return self._fault(f"{what}: torques {end}", self.time)
 
     # --- the end --------------------------------------------------------------------------
 
@@ -269,8 +272,11 @@ class Board(Instance):
             return
         self._rests = True
         for _ in range(TRIES):
-            with suppress(OSError):
+            try:
                 self._driver.send(self.safe.rest())
+                self._told = True
+            except OSError:
+                self._told = False
 
     dismiss = abandon = rest
 
@@ -295,5 +301,5 @@ class Board(Instance):
         raise self._fault("hardware goes no step back", self.time)
 
 
-def _told(error: Exception) -> str:
+def _words(error: Exception) -> str:
     return str(error) if isinstance(error, Silent) else f"cannot be reached: {error}"

@@ -58,6 +58,8 @@ def _path(error: Any, data: Any) -> Path | None:
             node = node[part]
             path = (*path, part)
         elif error["type"] == "missing" and i == len(error["loc"]) - 1:
+            if isinstance(node, list) and part >= _wanted_length(path, data, node):
+                return None
             path = (*path, part)
         else:
             kinds = types_of_keys.types_at(path, data)
@@ -65,6 +67,12 @@ def _path(error: Any, data: Any) -> Path | None:
             if part in {k.__name__ for k in kinds} - names:
                 return None
     return (*path, "type") if error["type"] == "union_tag_invalid" else path
+
+
+def _wanted_length(path: Path, data: Any, node: list[Any]) -> int:
+    """That of the shortest array that may be at `path` and has no fewer entries than `node`."""
+    sizes = (len(typing.get_args(kind)) for kind in types_of_keys.types_at(path, data))
+    return min(size for size in sizes if size >= len(node))
 
 
 def find_further_problems(known: Sequence[tuple[Path, str]], data: Any) -> list[tuple[Path, str]]:

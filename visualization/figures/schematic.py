@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from textwrap import wrap
 from typing import TYPE_CHECKING
 
 from hapticlink.fmus.blocks import component
@@ -14,7 +15,7 @@ from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.visualization.figures import diagonal_chart
 from hapticlink.visualization.figures.block_diagram import label
-from hapticlink.visualization.figures.diagonal_chart import Box, Chart
+from hapticlink.visualization.figures.diagonal_chart import LETTER, SIDE, Box, Chart
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 WIDTH = 2.2
 """Of a column (in)."""
+LETTERS = int(SIDE * WIDTH / LETTER)
+"""Of a line in a box."""
 NOTE = (
     "what a part gives leaves to the side, what it reads enters from above or below; "
     "the last line is its place in the report"
@@ -108,8 +111,9 @@ class _Wires:
         """The equation, the gains, and the source."""
         yield from part.equation.split("\n")
         values = {v.name: v for v in self._of[block].parameters}
-        gains = [_value(values[name]) for name in part.reads if name in values]
-        yield from gains
+        for name in part.reads:
+            if name in values:
+                yield from wrap(_value(values[name]), LETTERS)
         if part.source:
             yield part.source
 

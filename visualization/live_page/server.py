@@ -264,7 +264,9 @@ async def _served(
 def main() -> None:
     """Serve until the standard input ends."""
     out = to_caller()
-    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # connections that fail are no news
+    # Connections that fail, or are gone while something is written, are no news.
+    for name, level in (("websockets", logging.CRITICAL), ("asyncio", logging.ERROR)):
+        logging.getLogger(name).setLevel(level)
     if (arguments := read_message(sys.stdin.buffer)) is None:
         return
     host, ports, token, *second_run = arguments

@@ -143,6 +143,13 @@ def test_the_command_reads_a_log(tmp_path, capsys) -> None:
     assert json.loads((tmp_path / "fit" / "fit.json").read_text())["told"] == 7
 
 
+def test_a_log_that_tells_too_little_is_refused() -> None:
+    device = device_of("twin")
+    angles, _ = measured(device, {}, (1e-3, 1e-3, 0.02), 40)
+    with pytest.raises(hl.InputFault, match=r"the log tells too little.*through its workspace"):
+        fit_kinematics(device, angles, known=["a_left.at_parent"])
+
+
 def test_refusals(tmp_path) -> None:
     device = device_of("2diy")
     with pytest.raises(hl.InputFault, match=r"no parameter 'left.at'; there are left.at_parent"):

@@ -19,10 +19,16 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.search.settings import Scales
-from hapticlink.analysis.stability import forward_sensitivity, judge_scene, margin_and_remedy
+from hapticlink.analysis.stability import (
+    forward_sensitivity,
+    hand_cases,
+    judge_scene,
+    margin_and_remedy,
+)
 from hapticlink.analysis.stability.hand_cases import Case, InHands, in_poses, worst_case
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import HANDS, OWN, free
+from hapticlink.analysis.stability.judge_scene import _visit_poses
 from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, _Search, improvements
@@ -452,6 +458,30 @@ def test_a_verdict_that_is_interrupted_says_what_was_done(
     said = r"interrupted \(margins at .* \(.* 1/s in .*\); \d of \d steps were done\)"
     with pytest.raises(Interrupted, match=said), steps("stability", hidden=True) as tell:
         hl.stability("virtual-wall", poses=1, progress=tell)
+
+
+def test_of_two_poses_of_one_name_margins_are_of_the_one_that_was_judged(
+    slider: hl.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where a wrench leads, of which there are two guesses, and the first has no equilibrium."""
+
+    def at_second(read: hl.Scene, pose: Pose, *arguments: Any, **named: Any) -> Any:
+        if pose.time < 0:
+            raise InputFault("no equilibrium is found")
+        return at_pose(read, pose, *arguments, **named)
+
+    def visit(*arguments: Any) -> Any:
+        (pose, *_), run = _visit_poses(*arguments)
+        led = replace(pose, title="where it leads")
+        return [replace(led, time=-1.0), led], run
+
+    for module in (hand_cases, margin_and_remedy):
+        monkeypatch.setattr(module, "at_pose", at_second)
+    monkeypatch.setattr(judge_scene, "_visit_poses", visit)
+    found = hl.stability(slider, poses=1)
+    assert found.worst.pose == "where it leads"
+    assert not found.without
+    assert found.margin.stiffness
 
 
 def test_a_verdict_tells_what_is_judged_and_counts_its_steps() -> None:

@@ -143,6 +143,8 @@ def test_the_workspace_of_a_stage_is_its_ranges_and_that_of_a_paddle_its_arc():
         [-0.07 * np.sin(0.8), 0.07 * np.sin(0.8)], abs=1e-4
     )
     assert margin(paddle, np.array([[0.2, 0.0, 0.0]]))[0] < 0  # farther than its lever
+    nowhere = device("paddle", {"joint.pivot.range": [0.9, 0.95], "handle.at": [0.0, 1e-3]})
+    assert extents_along(nowhere) == [None]
 
 
 @pytest.mark.parametrize("angle", ["free", "fixed"])

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.findings.summary import lines
 from hapticlink.analysis.fit.log import read_log
 from hapticlink.api.runs import with_board
 from hapticlink.components.device.models import device_model
@@ -152,6 +153,26 @@ def check_fault(port, tmp_path, monkeypatch, kind: str, tick: int) -> None:
 def assert_matches(pattern: str, text: str) -> None:
     with pytest.raises(ValueError, match=pattern):
         raise ValueError(text)
+
+
+def test_a_board_that_is_gone_is_not_said_to_be_at_rest(port, tmp_path):
+    write = port.write
+
+    def unplugged(message: bytes) -> None:
+        if port.firmware.messages > 20:
+            raise OSError(5, "Input/output error")
+        write(message)
+
+    port.write = unplugged
+    told = str(ran(port, tmp_path).outcome.fault)
+    assert "Input/output error: torques may be on: switch the motors off" in told
+
+
+@pytest.mark.parametrize(("limit", "told"), [(1e-3, True), (0.5, False)])
+def test_less_torque_than_was_asked_for_is_told(port, tmp_path, limit, told):
+    options = {"device.driver.torque_limit": limit, "device.driver.torque_rate": 1e6}
+    said = [*lines(ran(port, tmp_path, **options).results)]
+    assert any("the board was sent less torque than was asked for" in line for line in said) == told
 
 
 def test_a_turn_that_fails_leaves_no_torque(port, tmp_path):

@@ -40,6 +40,7 @@ REFUSED = {
         ("device.handle.body=knob", "no body 'knob'"),
         ("device.joint.a_left.range=[1.0, 0.5]", "1.0 is not below 0.5: give both ends"),
         ("device.handle={ body = 'crank', along = [1.0, 0.0] }", "is one direction of the plane"),
+        ("device.base=[0.1]", "1 fault\n  --set 'device.base=[0.1]': device.base[1]: is missing"),
         ("device.motor.ratio=0", "ratio = 0 is a motor that moves nothing"),
         ("device.motor={ inertia = 1e-5 }", "give its motor a torque_limit (N.m)"),
         ("device.sensing=encoders", "write `sensing` outside of [device]"),

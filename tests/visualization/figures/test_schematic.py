@@ -70,6 +70,13 @@ def test_a_drawing_says_where_signals_come_from_and_how_they_are_held() -> None:
     assert "k_j = 200 1/s2" in said
 
 
+def test_no_line_is_wider_than_its_box() -> None:
+    said = texts("closed-loop", (("device.motor.damping", 1.25e-5),))["device"]
+    assert "motor_damping = 1.25e-05," in said
+    lines = said[said.index("motor_damping") :].split("\n")
+    assert max(len(line) for line in lines if "$" not in line) <= schematic.LETTERS
+
+
 @cache
 def _components(scene: str) -> dict[str, Component]:
     return {b.name: component(b.block, b.settings) for b in blocks(hl.scene(scene)).built}
