@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7505,
+    "components": 7506,
     "fmus": 2997,
-    "orchestrator": 16831,
+    "orchestrator": 16841,
     "programs": 1045,
-    "analysis": 9105,
-    "visualization": 3852,
+    "analysis": 9131,
+    "visualization": 3855,
     "api": 635,
     "commands": 1636,
 }
