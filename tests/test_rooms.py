@@ -31,11 +31,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 
 CODE_LINES = {
     "components": 7503,
-    "fmus": 2997,
+    "fmus": 2995,
     "orchestrator": 16841,
-    "programs": 1045,
+    "programs": 1046,
     "analysis": 9169,
-    "visualization": 3855,
+    "visualization": 3854,
     "api": 640,
     "commands": 1638,
 }
