@@ -52,7 +52,7 @@ def dragged(page: Page, folder: Path, point: str = "") -> tuple[list[str], np.nd
     page.page.mouse.up()
     if point:
         # While it holds no point the page's hand damps the handle; that of a table lets go of it.
-        page.until("Math.hypot(...view.frame.F_hand) < 1e-7")
+        page.until("Math.hypot(...view.frame.F_hand) < 1e-8")
         page.page.select_option("[data-control='linkage.operational_point']", point)
         page.run_for(0.2)
         page.pull(0.01, 0.02)
