@@ -23,6 +23,7 @@ from hapticlink.fmus.native.compiler import (
     host_platform,
 )
 from hapticlink.fmus.native.fmi3_interface import fmi3_sources
+from hapticlink.fmus.native.source import component_source
 from hapticlink.fmus.reproducible_zip import digest, guid_of
 from hapticlink.fmus.write_fmu import write_fmu
 from hapticlink.orchestrator.base import interrupt, temporary_folders
@@ -108,7 +109,8 @@ def program_files(
     with resolve_scene(scene, without) as program:
         blocks_of_members = components(program)
         variables = ports(program, blocks_of_members)
-        texts = write_sources(program, blocks_of_members, variables)
+        sources = {fmu: component_source(block) for fmu, block in blocks_of_members.items()}
+        texts = write_sources(program, sources, variables)
         capable, resources = capabilities(program), dict(_resources(program))
         haptic = program.system.timeline.clocks[0]
         step_size = program.system.timeline.seconds(haptic.longest)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import casadi as ca
@@ -45,7 +44,8 @@ def write_page_sources(
     reading = (name for name, foreign in program.foreign.items() if foreign.resources)
     reasons = (f"{name} has resources, files that a page lacks" for name in reading)
     refusals.refuse(program.scene.title, reasons)
-    texts = write_sources(program, components, ports, partial(_smallest_source, program, offered))
+    blocks = {fmu: _smallest_source(program, offered, fmu, c) for fmu, c in components.items()}
+    texts = write_sources(program, blocks, ports)
     texts |= {"program.inc": texts.pop("program.c"), **_picture(drawing)}
     texts[PAGE] = (HERE / PAGE).read_text().replace('"program.c"', '"program.inc"')
     texts["scene.h"] = f'#define GUID ""\n{texts["scene.h"]}'

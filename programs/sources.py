@@ -5,14 +5,13 @@ from __future__ import annotations
 import ctypes
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
-from hapticlink.components.component import Component
 from hapticlink.fmus.cache import sha
 from hapticlink.fmus.native.compiler import FMI2_HEADERS, HEADERS
 from hapticlink.fmus.native.native_fmu_entries import INCLUDED, WRAPPER
-from hapticlink.fmus.native.source import component_source, number, table
+from hapticlink.fmus.native.source import number, table
 from hapticlink.fmus.reproducible_zip import guid_of
 from hapticlink.orchestrator.fmi.description import SERIALISED, STATE
 from hapticlink.orchestrator.run.compiled import build as loop
@@ -31,12 +30,10 @@ LEFT_OUT = ("platform.c", "process_state.c", "lanes.c")
 
 def write_sources(
     resolved: Resolved,
-    components: Mapping[str, Component],
+    blocks: Mapping[str, Source],
     ports: Sequence[Port],
-    source: Callable[[str, Component], Source] = lambda fmu, component: component_source(component),
 ) -> dict[str, str]:
-    """All C files by name; scene.h lacks the GUID. components: of the members that are blocks of
-    this project, of which `source` gives the text."""
+    """All C files by name; scene.h lacks the GUID. blocks: the members that are of this project."""
     files = {name: (loop.HERE / name).read_text() for name in loop.SOURCES if name not in LEFT_OUT}
     files |= {path.name: path.read_text() for path in INCLUDED}
     files["hold_table.h"] = loop.HOLD_TABLE
@@ -50,7 +47,7 @@ def write_sources(
             guids[fmu] = resolved.foreign[fmu].description.guid
             files |= resolved.foreign[fmu].sources(id_, {*functions})
         else:
-            guids[fmu], own = _member(id_, *source(fmu, components[fmu]))
+            guids[fmu], own = _member(id_, *blocks[fmu])
             files |= own
     files["scene.h"] = _scene(resolved, ports, ids, guids, functions)
     return files

@@ -20,7 +20,6 @@ from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import StartPose, linearisable
-from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.linkage import Linkage
 from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
@@ -55,21 +54,18 @@ def _is_felt(mode: Mode) -> bool:
 class RestingScene:
     """A scene at its equilibrium in the hand that it has, searched from a `start`, such as the
     `equilibrium` of the same scene at other rates. T: the haptic period (s). gains: those of its
-    laws, with which the map begins `scaled`. space: of its ports. Raises InputFault where there is
-    no equilibrium."""
+    laws, with which the map begins `scaled`. Raises InputFault where there is no equilibrium."""
 
     def __init__(
         self,
         map_: LiftedMap,
         gains: Gains,
-        T: float,
+        scene: Scene,
         start: Vector | None = None,
         scaled: float = 1.0,
-        linkage: Linkage | None = None,
-        space: PortSpace = PLANE,
     ) -> None:
-        self.map, self.gains, self.T = map_, gains, T
-        self._linkage, self.space = linkage, space
+        self.map, self.gains, self.T = map_, gains, float(1 / exact(scene.haptics.rate))
+        self._linkage, self.space = scene.linkage, scene.space
         if start is None or len(start) != len(map_.start):  # holds keep more or fewer samples
             start = map_.start
         self._home = equilibrium(map_, start)
@@ -176,12 +172,12 @@ def resting_system(
     """`resting` of a system that is built."""
     with ExitStack() as stack:
         system = long_enough(read, system)
-        gains, T = Gains(system, read.controllers), float(1 / exact(read.haptics.rate))
+        gains = Gains(system, read.controllers)
 
         def rested(scale: float) -> RestingScene:
             softer = gains.applied(system, dict.fromkeys(gains.laws, scale))
             map_ = stack.enter_context(open_lifted_map(softer, read, work))
-            return RestingScene(map_, gains, T, start, scale, read.linkage, read.space)
+            return RestingScene(map_, gains, read, start, scale)
 
         try:
             place = rested(1.0)

@@ -15,7 +15,7 @@ method that keeps the handle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import casadi as ca
@@ -47,8 +47,7 @@ class JointCoordinates(DeviceModel):
         return self._rates(z, p) @ v
 
     def gaps(self, z: ca.SX, p: Parameters) -> ca.SX:
-        at = self._at(ca.SX.sym("q", z.numel()), p)
-        return self._placed(at.h, at, z)
+        return self._placed(lambda at: at.h, z, p)
 
     def moved(self, z: ca.SX, dy: ca.SX, p: Parameters) -> ca.SX:
         q = z + self.rate(z, dy, p)
@@ -105,13 +104,12 @@ class JointCoordinates(DeviceModel):
 
     def _matrix(self, q: ca.SX, p: Parameters) -> ca.SX:
         """A."""
-        at = self._at(ca.SX.sym("q", q.numel()), p)
-        return self._placed(ca.vertcat(at.W, self.directions.pick(at.J_h)), at, q)
+        return self._placed(lambda at: ca.vertcat(at.W, self.directions.pick(at.J_h)), q, p)
 
-    @staticmethod
-    def _placed(value: ca.SX, at: LinkageModel, q: ca.SX) -> ca.SX:
-        """What is given at the symbols of a linkage, at q."""
-        (placed,) = ca.substitute([value], [at.q], [ca.densify(q)])
+    def _placed(self, of: Callable[[LinkageModel], ca.SX], q: ca.SX, p: Parameters) -> ca.SX:
+        """What is derived at symbols of the linkage, at q."""
+        at = self._at(ca.SX.sym("q", q.numel()), p)
+        (placed,) = ca.substitute([of(at)], [at.q], [ca.densify(q)])
         return placed
 
     def _rates(self, q: ca.SX, p: Parameters) -> ca.SX:

@@ -20,14 +20,12 @@ def component_source(
     """component.h (sizes, names, start values and functions) and the texts of further C files, with
     pieces of long functions, as `split_functions.split`; the same texts for the same component.
     With `rarely` = 0 outputs on request are never evaluated in a step, and with the states `start`
-    these are not computed: there is less code.
+    these are not computed: the compiler leaves out the functions of either.
 
     The functions are `static`, so that their names (initialize, output, advance) cause no conflict.
     """
     parts = functions_of_fmu(component)
-    unused = [parts.advance] if parts.reduced and not rarely else []
-    unused += [parts.initialize] if start else []
-    text, pieces = functions(f for f in parts.functions if all(f is not out for out in unused))
+    text, pieces = functions(parts.functions)
     settable = (*component.inputs, *component.parameters)
     fixed = [False] * len(component.start_inputs)
     fixed += [v.variability == "fixed" for v in component.parameters for _ in v.names]

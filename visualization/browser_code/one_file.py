@@ -88,8 +88,7 @@ def _needs(name: str) -> Iterator[str]:
 
 
 def _module(name: str) -> str:
-    text = _text(name)
-    text = COMMENT.sub("", text)
+    text = COMMENT.sub("", _text(name))
     text = IMPORT.sub(lambda found: f"const {{ {found[1]} }} = {_variable(found[2])};", text)
     return EXPORT.sub("", text)
 

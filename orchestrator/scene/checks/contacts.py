@@ -21,8 +21,8 @@ def check_contacts(scene: Scene) -> Iterator[Problem]:
     if scene.controller and scene.controller.contact and not scene.contacts and not limited:
         message = "there is nothing to touch: add [contacts] or limits of a joint"
         yield ("controller", "contact"), message
-    if scene.contacts is None:
-        return
+    if scene.contacts is None or (scene.linkage and scene.linkage.dimension > 2):
+        return  # the latter are refused as a whole, by checks/space.py
     contacts, here = scene.contacts, ("contacts",)
     if scene.linkage is None or not any(b.shape for b in scene.linkage.body):
         yield here, "no body has a shape: give a [[linkage.body]] its radius or corners"

@@ -131,8 +131,8 @@ def _of_the_plane(scene: Scene, linkage: Linkage) -> Iterator[Problem]:
         table = path_of_user("controller", user if user in scene.controllers else "")
         yield from _defaults((*table, "teleoperation"), controller.teleoperation, _COUPLING)
     if scene.contacts:
-        text = "are of the plane: a linkage in space has none, take them out"
-        yield ("contacts",), f"{text}; here {linkage.spatial} put it in space"
+        text = f"are of the plane, and {linkage.spatial} put the linkage in space"
+        yield ("contacts",), f"{text}: take the table out"
     if scene.local_model:
         yield ("local_model",), "is of the plane: leave it out"
     if linkage.points:

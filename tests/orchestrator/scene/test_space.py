@@ -44,7 +44,7 @@ REFUSED = [
         'in space take "spherical"',
     ),
     (DEVICE % "base = [0, 0, 1]", "device.joint[0] (j).axis: [0.0, 0.0, 0.0] has no length"),
-    ("contacts={ stiffness = 1e3 }", "are of the plane: a linkage in space has none, take them"),
+    ("contacts={ stiffness = 1e3 }", "are of the plane, and a spherical joint put the linkage in"),
     ("local_model=true", "local_model: is of the plane: leave it out"),
 ]
 

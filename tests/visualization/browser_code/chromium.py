@@ -46,7 +46,7 @@ class Page:
         width: int = 1280,
         height: int = 800,
         dark: bool = False,
-        shown: str = "view.frame && view.stage.limits",
+        shown: str = "window.view?.frame && view.stage.limits",
     ) -> None:
         self.faults: list[str] = []
         self.page = browser.new_page()

@@ -51,11 +51,12 @@ def dragged(page: Page, folder: Path, point: str = "") -> tuple[list[str], np.nd
     page.until("view.frame?.t > 1.1")
     page.page.mouse.up()
     if point:
-        page.until("view.frame?.t > 1.2")
+        # While it holds no point the page's hand damps the handle; that of a table lets go of it.
+        page.until("Math.hypot(...view.frame.F_hand) < 1e-8")
         page.page.select_option("[data-control='linkage.operational_point']", point)
-        page.until("view.frame?.t > 1.4")
+        page.run_for(0.2)
         page.pull(0.01, 0.02)
-        page.until("view.frame?.t > 1.8")
+        page.run_for(0.4)
         page.page.mouse.up()
     with page.page.expect_download() as download:
         page.page.click("#record")
@@ -76,7 +77,7 @@ def test_a_drag_gives_the_numbers_of_a_run_with_the_same_forces(
 
 
 def require_same_numbers(
-    names: list[str], rows: np.ndarray, *options: str, **changes: object
+    names: list[str], rows: np.ndarray, *options: str, near: float = 1e-9, **changes: object
 ) -> None:
     """A run over the whole seconds of the rows has their numbers."""
     rows = rows[: 1 + 512 * (len(rows) // 512)]
@@ -90,7 +91,7 @@ def require_same_numbers(
     columns = [name for name in table.columns[1:] if not name.startswith("hand.")]
     assert len(columns) > 40
     for name in columns:
-        assert rows[:, names.index(name)] == pytest.approx(table[name], rel=1e-9, abs=1e-9), name
+        assert rows[:, names.index(name)] == pytest.approx(table[name], rel=near, abs=near), name
 
 
 def test_the_hand_takes_another_point_as_at_a_given_time(window: Window, tmp_path: Path) -> None:
@@ -107,7 +108,7 @@ def test_the_hand_takes_another_point_as_at_a_given_time(window: Window, tmp_pat
     assert [*held[np.flatnonzero(np.diff(held, prepend=-1.0))]] == [1.0, 0.0, 2.0]
     begun = rows[np.argmax(asked == 2.0) - 1, 0]
     event = {"time": begun, "set": {"linkage.operational_point": "other"}}
-    require_same_numbers(names, rows, *POINTS, at=[event])
+    require_same_numbers(names, rows, *POINTS, at=[event], near=1e-5)
     page.page.click("#reset")
     page.until("view.frame?.t > 0.2")
     chosen = "document.querySelector('[data-control=\"linkage.operational_point\"]').value"
@@ -184,7 +185,7 @@ def test_time_goes_as_slowly_as_the_address_says(file: Path, window: Window) -> 
     page.page.click("#compare")
     page.until("view.frame?.b")
     assert_slow_motion(page, 0.05)
-    assert page.get("view.frame.b.t") == page.get("view.frame.t")
+    assert page.get("view.frame.b.t === view.frame.t")
     page.page.click("#restore")
     page.until("!location.hash.includes('speed')")
 
