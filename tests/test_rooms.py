@@ -30,12 +30,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7506,
-    "fmus": 2997,
+    "components": 7504,
+    "fmus": 2995,
     "orchestrator": 16841,
-    "programs": 1045,
-    "analysis": 9131,
-    "visualization": 3855,
+    "programs": 1046,
+    "analysis": 9129,
+    "visualization": 3854,
     "api": 635,
     "commands": 1636,
 }
