@@ -30,7 +30,7 @@ from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.fmi.description import ONCE, SERIALISED, STATE
 from hapticlink.orchestrator.results import folders
 from hapticlink.orchestrator.scene.blocks import blocks
-from hapticlink.orchestrator.scene.scene import WrittenScene
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.step_sizes import sizes
 from hapticlink.programs.description import describe_program, make_documentation
 from hapticlink.programs.foreign import write_files
@@ -45,7 +45,7 @@ Pictures = Callable[[], Mapping[str, bytes]]
 
 
 def build_program(
-    scene: WrittenScene,
+    scene: Scene,
     name: str | Path,
     *,
     out: str | Path,
@@ -98,7 +98,7 @@ def _identifier(name: str | Path) -> str:
 
 
 def program_files(
-    scene: WrittenScene,
+    scene: Scene,
     identifier: str,
     without: str | None = None,
     fmi: int = 2,

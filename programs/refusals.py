@@ -6,20 +6,19 @@ from collections.abc import Iterable
 
 from hapticlink.orchestrator.base.errors import InputFault, unknown
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.scene.scene import Scene, WrittenScene
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.system import System
 from hapticlink.programs.foreign import Foreign, read_foreign
 
 
-def of_scene(scene: WrittenScene) -> None:
+def of_scene(scene: Scene) -> None:
     """Raises InputFault for what only Python does."""
     reasons = []
     if scene.start_time:
         reasons.append("start_time: whoever runs the FMU gives it (setupExperiment), leave it out")
-    why = "what happens at given times is done by Python"
-    each = (("at", i) for i in range(len(scene.at)))
-    paths = dict.fromkeys(path if path in scene.signals else path[:1] for path in each)
-    reasons += dict.fromkeys(str(scene.place(path, why)) for path in paths)
+    if scene.at:
+        why = "what happens at given times is done by Python"
+        reasons.append(str(scene.place(("at", 0), why)))
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]
     if scene.coupling == "iterated":
         reasons.append("coupling = 'iterated': steps are repeated by Python")

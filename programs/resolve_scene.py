@@ -32,7 +32,7 @@ from hapticlink.orchestrator.run.initialize import MOST, TOLERANCE, StartValues
 from hapticlink.orchestrator.run.instructions import Move, Sample, instructions
 from hapticlink.orchestrator.run.open_fmus import LoadedFmus
 from hapticlink.orchestrator.run.simulation import Simulation
-from hapticlink.orchestrator.scene.scene import Scene, WrittenScene
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.orchestrator.system.system import Recording, System
 from hapticlink.programs import refusals
@@ -122,7 +122,7 @@ class Resolved:
 
 @contextmanager
 def resolve_scene(
-    scene: WrittenScene, outside: str | None = None, changing: bool = False
+    scene: Scene, outside: str | None = None, changing: bool = False
 ) -> Iterator[Resolved]:
     """The structures of a scene's run. outside: the block to leave out. changing: holds and rates
     can be changed while the program runs. Raises InputFault, with what stands in the way, for a

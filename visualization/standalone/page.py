@@ -13,7 +13,7 @@ from hapticlink.fmus.native.compiler import WEBASSEMBLY_FLAGS, compiler_version
 from hapticlink.orchestrator.base import interrupt, temporary_folders
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.results import folders
-from hapticlink.orchestrator.scene.scene import WrittenScene
+from hapticlink.orchestrator.scene.scene import Scene
 from hapticlink.programs.build import components
 from hapticlink.programs.page_program import compile_page, write_page_sources
 from hapticlink.programs.ports import ports
@@ -30,7 +30,7 @@ POLICY = (
 MODULE = "page.wasm"
 
 
-def write_page(scene: WrittenScene, name: str, path: Path) -> None:
+def write_page(scene: Scene, name: str, path: Path) -> None:
     """Write the page of a scene of `load_viewed_scene`. name: of the files that the page saves.
     Raises InputFault where the scene cannot become a program, with what stands in the way."""
     folders.ensure(path.parent, "--standalone")
@@ -39,7 +39,7 @@ def write_page(scene: WrittenScene, name: str, path: Path) -> None:
         unfinished.write_text(text, encoding="utf-8")
 
 
-def html(scene: WrittenScene, name: str) -> str:
+def html(scene: Scene, name: str) -> str:
     """The page. The same scene gives the same bytes."""
     with temporary_folders.temporary_folder() as room:
         with resolve_scene(scene, changing=True) as program:
