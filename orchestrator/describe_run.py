@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from hapticlink.fmus.versions import find_code, find_versions
@@ -12,12 +12,14 @@ from hapticlink.orchestrator.base.signal_names import MECHANISM
 from hapticlink.orchestrator.fmi.units import MATRICES
 from hapticlink.orchestrator.holds import HOLDS
 from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.results.rows_file import TEXTS
 from hapticlink.orchestrator.results.run_record import (
     ClockSteps,
     RecordedFmu,
     RefusedHold,
     RunSetup,
 )
+from hapticlink.orchestrator.run.signals import SignalVector
 from hapticlink.orchestrator.scene.blocks import blocks
 from hapticlink.orchestrator.scene.rates import VariableRate
 from hapticlink.orchestrator.scene.scene import Scene
@@ -30,8 +32,10 @@ PACKAGES = ("hapticlink", "casadi", "fmpy", "pythonfmu", "numpy")
 """Those whose versions are recorded."""
 
 
-def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[str]) -> RunSetup:
-    """The record of a run that has not begun. tables: names of its tables, without their ending;
+def setup(
+    scene: Scene, plan: Plan, tables: Mapping[str, Sequence[str]], not_recorded: list[str]
+) -> RunSetup:
+    """The record of a run that has not begun. tables: columns by the names of its tables;
     not_recorded: outputs of which an entry is not written in the rows of its rate."""
     system, timeline = plan.system, plan.system.timeline
     seconds, base = timeline.seconds, timeline.base
@@ -44,7 +48,7 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
         versions=find_versions(packages) | {"python": platform.python_version()} | find_code(),
         plugins=plugins.list_plugins(),
         seeds=_seeds(scene, system),
-        files=["run.json", *(f"{table}.{scene.record.format}" for table in tables)],
+        files=[*_list_files(scene, system, tables)],
         rates=[n for c in timeline.clocks for n in system.recording.tables(c.name)],
         clocks={
             c.name: ClockSteps(seconds(c.first), seconds(c.shortest), seconds(c.longest))
@@ -86,6 +90,13 @@ def setup(scene: Scene, plan: Plan, tables: Iterable[str], not_recorded: list[st
             *_find_idle_events(scene, system),
         ],
     )
+
+
+def _list_files(scene: Scene, system: System, tables: Mapping[str, Sequence[str]]) -> Iterator[str]:
+    yield from ("run.json", *(f"{table}.{scene.record.format}" for table in tables))
+    if scene.record.format == "rows":
+        texts = SignalVector(system).texts
+        yield from (f"{table}{TEXTS}" for table, columns in tables.items() if texts(columns))
 
 
 def describe_scene(scene: Scene) -> dict[str, Any]:

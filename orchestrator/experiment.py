@@ -49,7 +49,7 @@ from hapticlink.orchestrator.run.compiled import lanes, library
 from hapticlink.orchestrator.run.concurrent_fmus import COLUMNS, SAMPLES, require_concurrent
 from hapticlink.orchestrator.run.execute_plan import Outcome, Progress, run, run_side_by_side
 from hapticlink.orchestrator.run.fetched_outputs import choose_fetched
-from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware
+from hapticlink.orchestrator.run.open_fmus import find_isolated, refuse_hardware, refuse_text
 from hapticlink.orchestrator.run.real_time import RealTimeRun
 from hapticlink.orchestrator.run.run_state import RunState, require_savable
 from hapticlink.orchestrator.run.save_times import NO_TIMES, SaveTimes, Saving
@@ -324,6 +324,8 @@ def simulate(
         ready = replace(ready, before=before)
         build_time = perf_counter() - begin
         alone = find_isolated(system.fmus)
+        for change in (*system.changes, *(run_state.new_starts(state, system) if state else ())):
+            refuse_text(change, alone)
         foreign = [fmu.name for fmu in read.fmu if fmu.path and fmu.name not in alone]
         if in_memory and not foreign and _fits_in_memory(system, tables):
             memory = RunResults()

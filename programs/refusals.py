@@ -17,7 +17,8 @@ def of_scene(scene: Scene) -> None:
     if scene.start_time:
         reasons.append("start_time: whoever runs the FMU gives it (setupExperiment), leave it out")
     if scene.at:
-        reasons.append("[[at]]: what happens at given times is done by Python")
+        why = "what happens at given times is done by Python"
+        reasons.append(str(scene.place(("at", 0), why)))
     reasons += [f"{fmu.name} is made by {fmu.engine}" for fmu in scene.fmu if fmu.engine]
     if scene.coupling == "iterated":
         reasons.append("coupling = 'iterated': steps are repeated by Python")

@@ -26,7 +26,8 @@ def fit_start_value(scalar: Scalar, given: Given) -> Given:
         return dict(scalar.items)[given]
     kind = _takes(scalar)
     if not isinstance(given, kind) or (isinstance(given, bool) and scalar.type != "Boolean"):
-        raise ValueError(f"{given!r}: {scalar.name} takes {_WORDS[kind]}")
+        remedy = "; connect a text to a String" if isinstance(given, str) else ""
+        raise ValueError(f"{given!r}: {scalar.name} takes {_WORDS[kind]}{remedy}")
     if isinstance(given, str) and "\0" in given:
         raise ValueError(f"{given!r}: {scalar.name} would end at the \\0: texts of FMI do")
     if scalar.type == "Binary":

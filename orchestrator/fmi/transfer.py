@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from hashlib import sha256
 from itertools import groupby
@@ -30,14 +30,14 @@ _IN_C: dict[str, type[np.generic]] = {
 }  # fmt: skip
 _BOOLEAN = {"2": np.int32, "3": np.bool_}  # fmi2Boolean is an int, fmi3Boolean a bool
 
-_TEXTS = {0: b""}
+_TEXTS: dict[float, bytes] = {0: b""}
 _LOCK = threading.Lock()
 NUMBER = 6
 """Bytes of the number of a text, which a double holds exactly."""
 _followers: list[Callable[[int, bytes], object]] = []
 
 
-class Unfit(Exception):
+class Unfit(ValueError):
     """A number that its FMI type cannot hold."""
 
 
@@ -146,17 +146,25 @@ def number_of(text: bytes) -> int:
     return number
 
 
-def known_texts() -> dict[int, bytes]:
-    """All texts of this process by their numbers."""
+def text_of(number: float, name: str) -> bytes:
+    """The text of a signal's number. Raises Unfit where it is that of none, as in a state that was
+    changed."""
+    if (text := _TEXTS.get(number)) is None:
+        raise Unfit(f"{name} cannot be {number:.17g}, the number of no text")
+    return text
+
+
+def known_texts(numbers: Iterable[float]) -> dict[int, bytes]:
+    """Those of the numbers that are texts of this process, in their order, each once."""
     with _LOCK:
-        return dict(_TEXTS)
+        return {int(n): _TEXTS[n] for n in dict.fromkeys(numbers) if n in _TEXTS}
 
 
 def follow_texts(follower: Callable[[int, bytes], object]) -> None:
     """Tells `follower` all texts of this process, those to come when it meets them first."""
     with _LOCK:
-        for known in _TEXTS.items():
-            follower(*known)
+        for number, known in _TEXTS.items():
+            follower(int(number), known)
         _followers.append(follower)
 
 
@@ -179,6 +187,7 @@ class TextTransfer:
     def __init__(
         self, slave: Any, fmi: str, verb: str, scalars: Sequence[Scalar], values: Vector
     ) -> None:
+        self._names = [s.name for s in scalars]
         of, type_ = [s.reference for s in scalars if s.entry == 0], scalars[0].type
         n, size = ctypes.c_size_t(len(of)), len(scalars)
         self.name, self._values, self._gets = f"fmi{fmi}{verb}{type_}", values, verb == "Get"
@@ -193,7 +202,7 @@ class TextTransfer:
     def call(self) -> int:
         if not self._gets:
             for i, number in enumerate(self._values):
-                self._texts[i] = text = _TEXTS[round(number)]
+                self._texts[i] = text = text_of(number, self._names[i])
                 self._sizes[i] = len(text)
         status: int = self._function(*self._arguments)
         if self._gets and succeeded(status):

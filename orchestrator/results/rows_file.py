@@ -14,9 +14,10 @@ import errno
 import json
 import mmap
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from io import FileIO
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 from typing import BinaryIO
@@ -73,6 +74,11 @@ class RowsFile:
                 break
             last = times[-1]
         return before - self._count
+
+    def blocks(self) -> Iterator[Rows]:
+        """The rows, some at a time."""
+        step = max(AT_A_TIME // (8 * len(self.columns)), 1)
+        return (self[first : first + step] for first in range(0, self._count, step))
 
     def __len__(self) -> int:
         return self._count
@@ -218,6 +224,11 @@ def text_line(number: int, text: bytes) -> str:
     return f"{number} {text.hex()}\n"
 
 
+def text_numbers(rows: Iterable[Rows], places: Iterable[int]) -> Iterator[float]:
+    """The numbers of the texts in blocks of rows, which are at these places."""
+    return chain.from_iterable(block[:, [*places]].ravel().tolist() for block in rows)
+
+
 def read_texts(path: Path) -> Texts:
     """Of a file of texts; none where there is no such file. Its last line may be cut."""
     if not path.exists():
@@ -243,9 +254,8 @@ def header(columns: tuple[str, ...]) -> bytes:
 def write_csv(table: RowsFile, target: BinaryIO) -> None:
     """Write a table as CSV to `target`."""
     target.write(header(table.columns))
-    step = max(AT_A_TIME // (8 * len(table.columns)), 1)
-    for first in range(0, len(table), step):
-        target.write(text(table[first : first + step], table.texts))
+    for rows in table.blocks():
+        target.write(text(rows, table.texts))
 
 
 def write_empty(path: Path, columns: tuple[str, ...], as_csv: bool) -> None:

@@ -97,10 +97,10 @@ class RunFolder(RunResults):
         if not self._may_be_published():
             return
         write_atomically(self.folder / RUN, self._begun + b" " * ROOM)
-        super()._publish()
         own = {RUN, *(name for recorder in recorders for name in recorder.files)}
         for name in self._earlier - own:
             (self.folder / name).unlink(missing_ok=True)
+        super()._publish()
 
     def leave_out(self, names: Collection[str]) -> None:
         """Have the record list no such files."""
@@ -115,6 +115,8 @@ class RunFolder(RunResults):
                 suffix = ".csv" if self._csv else rows_file.SUFFIX
                 with atomic_file(self.folder / f"{clock}{suffix}") as empty:
                     rows_file.write_empty(empty, ("time", *names), self._csv)
+            names = self._setup["files"]
+            self.leave_out([name for name in names if name.endswith(rows_file.TEXTS)])
             self.published = True
         if self.published:
             write_json(self.folder / RUN, self._setup | content(ending))

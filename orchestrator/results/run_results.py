@@ -12,7 +12,7 @@ import numpy as np
 from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.fmi.transfer import known_texts
 from hapticlink.orchestrator.results.read_results import Table
-from hapticlink.orchestrator.results.rows_file import name_texts
+from hapticlink.orchestrator.results.rows_file import name_texts, text_numbers
 
 
 @dataclass(frozen=True)
@@ -163,13 +163,10 @@ class RunResults:
 
     def tables(self) -> dict[str, Table]:
         """The tables by clock, which keep what is read of them."""
-        empty = np.zeros((0, 1))
-        return {
-            clock: Table(
-                r.columns,
-                empty if r.rows is None else r.rows[: r.filled.value],
-                texts=name_texts(r.texts, known_texts()),
-                _kept={},
-            )
-            for clock, r in self._recorders.items()
-        }
+        return {clock: _table_of(r) for clock, r in self._recorders.items()}
+
+
+def _table_of(r: Recorder) -> Table:
+    rows = np.zeros((0, 1)) if r.rows is None else r.rows[: r.filled.value]
+    texts = name_texts(r.texts, known_texts(text_numbers([rows], r.texts)))
+    return Table(r.columns, rows, texts=texts, _kept={})

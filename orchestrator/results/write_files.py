@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from itertools import starmap
 from pathlib import Path
 from typing import Any
 
@@ -71,12 +72,15 @@ class FileRecorder(Recorder):
 
     def _publish_texts(self) -> None:
         """Write the texts of this process beside the rows, each further one before it is in a
-        row."""
-        path = self.path.with_suffix(rows_file.TEXTS)
-        path.unlink(missing_ok=True)
+        row, for a run that is killed."""
+        self.path.with_suffix(rows_file.TEXTS).unlink(missing_ok=True)
         if self.texts:
-            path.write_text(json.dumps(self.texts) + "\n")
+            self._write_texts({})
             transfer.follow_texts(self._add_text)
+
+    def _write_texts(self, texts: Mapping[int, bytes]) -> None:
+        lines = [json.dumps(self.texts) + "\n", *starmap(rows_file.text_line, texts.items())]
+        write_atomically(self.path.with_suffix(rows_file.TEXTS), "".join(lines).encode())
 
     def _add_text(self, number: int, text: bytes) -> None:
         with self.path.with_suffix(rows_file.TEXTS).open("a") as file:
@@ -90,7 +94,12 @@ class FileRecorder(Recorder):
 
     def require_whole(self) -> None:
         if self._published and not self.is_awaited:
-            self._require_rows(rows_file.RowsFile(self.target))
+            table = rows_file.RowsFile(self.target)
+            self._require_rows(table)
+            transfer.leave_texts(self._add_text)
+            if self.texts:  # of the process as yet
+                numbers = rows_file.text_numbers(table.blocks(), self.texts)
+                self._write_texts(transfer.known_texts(numbers))
 
     def _require_rows(self, table: rows_file.RowsFile) -> None:
         if (written := len(table)) != self.recorded:

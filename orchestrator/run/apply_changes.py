@@ -14,9 +14,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.arrays import Vector
-from hapticlink.orchestrator.base.errors import InputFault
-from hapticlink.orchestrator.fmi.variables import WRITTEN
-from hapticlink.orchestrator.run.open_fmus import LoadedFmus
+from hapticlink.orchestrator.run.open_fmus import LoadedFmus, refuse_text
 from hapticlink.orchestrator.system.system import InputChange
 
 
@@ -30,11 +28,7 @@ class InputSetter:
     def __init__(self, change: InputChange, fmus: LoadedFmus) -> None:
         self._change, self._signals = change, fmus.signals
         self._instance = fmus.instances[change.fmu]
-        texts = [s.name for s in change.inputs if s.type in WRITTEN]
-        if texts and change.fmu in fmus.isolated:
-            what = f"{change.fmu}.{texts[0]} is a text, which is set within one process"
-            why = f"{change.fmu} runs in another ({fmus.isolated[change.fmu]})"
-            raise InputFault(f"{what}; {why}: set its start value")
+        refuse_text(change, fmus.isolated)
         self._set = self._instance.connect(change.inputs, range(len(change.inputs)))
         self.values = np.array(change.values) if change.values else None
         self._random = np.random.Generator(np.random.PCG64(change.seed))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from functools import partial
 
@@ -20,7 +20,7 @@ from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.network.remote_fmu import Remote
 from hapticlink.orchestrator.run.python_modules import clashes, find_bundled
 from hapticlink.orchestrator.run.signals import SignalVector
-from hapticlink.orchestrator.system.system import Connection, Fmu, ServedAt, System
+from hapticlink.orchestrator.system.system import Connection, Fmu, InputChange, ServedAt, System
 
 
 def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
@@ -44,6 +44,15 @@ def find_isolated(fmus: Iterable[Fmu]) -> dict[str, str]:
             remedy = "leave it out of [[connection]] and record.signals, or take an array of UInt8"
             raise InputFault(f"{what}; {why}: {remedy}")
     return alone
+
+
+def refuse_text(change: InputChange, isolated: Mapping[str, str]) -> None:
+    """Raises InputFault for a change of a text of an `isolated` FMU."""
+    text = next((s.name for s in change.inputs if s.type in WRITTEN), None)
+    if text and change.fmu in isolated:
+        what = f"{change.fmu}.{text} is a text, which is set within one process"
+        why = f"{change.fmu} runs in another ({isolated[change.fmu]})"
+        raise InputFault(f"{what}; {why}: set its start value")
 
 
 def refuse_hardware(fmus: Iterable[Fmu]) -> None:

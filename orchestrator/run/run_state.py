@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache, partial
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import numpy as np
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi.description import SERIALISED
 from hapticlink.orchestrator.fmi.event_mode import InProcessWithEvents
-from hapticlink.orchestrator.fmi.transfer import as_signal, known_texts, number_of
+from hapticlink.orchestrator.fmi.transfer import as_signal, known_texts, number_of, text_of
 from hapticlink.orchestrator.fmi.variables import WRITTEN
 from hapticlink.orchestrator.holds.hold import Hold, HoldContext
 from hapticlink.orchestrator.results.state_file import expect_state, read_state, write_state
@@ -127,7 +128,7 @@ def _capture(simulation: Simulation, loop: CompiledLoop) -> dict[str, Any]:
     from hapticlink.fmus.versions import version
 
     system, signals = simulation.system, simulation.signals
-    return {
+    content = {
         "version": version("hapticlink"),
         "layout": _layout(),
         "time": simulation.time(loop.events.next),
@@ -151,9 +152,19 @@ def _capture(simulation: Simulation, loop: CompiledLoop) -> dict[str, Any]:
         "iterations": loop.operations.saved(),
         "balance": simulation.balance.begun,
         "changes": [_capture_change(*each) for each in simulation.changing],
-        "texts": [*known_texts().values()] if _has_texts(system) else [],
         "rows": {name: r.count.value for name, r in simulation.recorders.items()},
     }
+    texts = known_texts(_find_numbers(content)) if _has_texts(system) else {}
+    return content | {"texts": [*texts.values()]}
+
+
+def _find_numbers(content: Any) -> Iterator[float]:
+    """All that may be numbers of texts: those wait in holds and queues, too."""
+    if isinstance(content, Mapping | list | tuple | deque):
+        each = content.values() if isinstance(content, Mapping) else content
+        yield from chain.from_iterable(map(_find_numbers, each))
+    elif isinstance(content, int | float | np.ndarray):
+        yield from np.ravel(content).tolist()
 
 
 def _has_texts(system: System) -> bool:
@@ -306,6 +317,8 @@ def _restore(state: RunState, simulation: Simulation, loop: CompiledLoop) -> Non
     for name, check in simulation.step_checks.items():
         if name in saved["checks"]:
             check.restore(saved["checks"][name])
+    for name, number in signals.text_values():
+        text_of(number, name)
     loop.operations.restore(dict(saved["iterations"]))
     simulation.balance.begun = float(saved["balance"])
     loop.events.restore(saved["events"])

@@ -3,7 +3,8 @@ that the far sides of springs have put in."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator
+from itertools import count
 
 import numpy as np
 
@@ -69,13 +70,23 @@ class SignalVector:
             return list(range(held.start, held.stop))
         return self.sources(connection)
 
-    def texts(self, recorded: Mapping[str, int] | None) -> dict[int, str]:
+    def texts(self, recorded: Iterable[str] | None) -> dict[int, str]:
         """By the places in a row of those recorded columns that are texts, their FMI types."""
         types = {
             f"{u.name}.{s.name}": s.type for u in self.system.fmus for s in u.description.outputs
         }
         columns = enumerate(recorded or (), 1)
-        return {place: types[name] for place, name in columns if types[name] in WRITTEN}
+        return {place: types[name] for place, name in columns if types.get(name) in WRITTEN}
+
+    def text_values(self) -> Iterator[tuple[str, float]]:
+        """The names and numbers of all texts, put out and held."""
+        for u in self.system.fmus:
+            for s, i in zip(u.description.outputs, count(self.fmu(u.name).start)):
+                if s.type in WRITTEN:
+                    yield f"{u.name}.{s.name}", self.values[i]
+        for c in self.system.connections:
+            if c.hold and c.outputs[0].type in WRITTEN:
+                yield from ((c.name, number) for number in self.values[self.hold(c.name)])
 
     def recorded(self, table: str) -> dict[str, int] | None:
         """The columns `fmu.variable` of a table with their indices, None where there are none."""

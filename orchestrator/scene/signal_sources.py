@@ -89,6 +89,8 @@ def with_signals(
             first = len(events)
             events += _set_texts(rows, start, target, fmus)
             moved |= {("at", n): i for n in range(first, len(events))}
+            name, _, port = target.partition(".")
+            moved |= {("fmu", n, "start", port): i for n in _find_fmu(name, fmus)}
             continue
         name = re.sub(r"\W+", "_", target).strip("_")
         while name in rates:
@@ -134,12 +136,15 @@ def _set_texts(
     """The [[at]] of texts from a start (s) on, of which the first is a start value of the FMU."""
     name, _, port = target.partition(".")
     before = sum(time <= start for time, _ in rows) or 1
-    for fmu in fmus:
-        if rows and name in (fmu.get("name"), fmu.get("replaces")):
-            fmu["start"] = {**(fmu.get("start") or {}), port: rows[before - 1][1]}
+    for n in _find_fmu(name, fmus) if rows else ():
+        fmus[n]["start"] = {**(fmus[n].get("start") or {}), port: rows[before - 1][1]}
     for (_, text), (time, newer) in pairwise(rows[before - 1 :]):
         if newer != text:
             yield {"time": time, "set": {target: newer}}
+
+
+def _find_fmu(name: str, fmus: list[dict[str, Any]]) -> list[int]:
+    return [n for n, fmu in enumerate(fmus) if name in (fmu.get("name"), fmu.get("replaces"))]
 
 
 def _has_units(source: Mapping[str, Any]) -> bool:

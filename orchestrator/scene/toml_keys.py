@@ -143,7 +143,10 @@ def _key_lines(text: str) -> dict[Path, int]:
 def written_path(path: Path, moved: Mapping[Path, int]) -> Path:
     """Where a scene's file has what is at `path` of tables with an FMU, or entries of `at`, for
     each connection from a signal; `moved`: by the place of each of them, and of the connections
-    that are left, the index of the connection."""
+    that are left, and of the start value that is the first text of a table, the index of the
+    connection."""
+    if (i := moved.get(path[:4])) is not None:
+        return ("connection", i, "from", "table")
     if (i := moved.get(path[:2])) is None:
         return path
     rest = {"fmu": ("from", *path[3:]), "at": ("from", "table"), "connection": path[2:]}

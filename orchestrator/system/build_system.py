@@ -12,7 +12,7 @@ from typing import Any
 
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
-from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.base.errors import Finding, SceneFault
 from hapticlink.orchestrator.base.signal_names import (
     CONTROLLER,
     DEVICE,
@@ -282,7 +282,12 @@ def _starts(fmu: Fmu, block: BlockPlan) -> StartValues:
 
 
 def _faults(scene: Scene, problems: Iterable[Problem]) -> SceneFault:
-    return SceneFault(scene.title, [scene.place(*problem) for problem in problems])
+    found: dict[object, Finding] = {}
+    for path, why in problems:
+        finding = scene.place(path, why)
+        # Of a table of texts the start value and each entry of `at` may be one: the first tells.
+        found.setdefault(finding.key if finding.key.endswith("from.table") else finding, finding)
+    return SceneFault(scene.title, [*found.values()])
 
 
 def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:

@@ -30,7 +30,7 @@ def changes(scene: Scene, system: System, problems: list[Problem]) -> tuple[Inpu
     """The changes in the order of their times; those that no step sees begin at the run's end or
     later. Findings are appended to `problems`."""
     if scene.at and scene.coupling == "iterated":
-        problems.append((("at",), 'steps are repeated with coupling = "iterated": take another'))
+        problems.append((("at", 0), 'steps are repeated with coupling = "iterated": take another'))
     events = _Events(scene, system)
     taken: list[InputChange] = []
     for i, event in enumerate(scene.at):

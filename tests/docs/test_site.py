@@ -85,5 +85,5 @@ def test_a_scene_that_cannot_become_a_page_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert make_standalone.main(["scenario"], tmp_path) == []
-    assert "[[at]]" in capsys.readouterr().out
+    assert "at[0]: what happens at given times" in capsys.readouterr().out
     assert not [*tmp_path.glob("*.html")]

@@ -2,6 +2,7 @@
 
 import csv
 import dataclasses
+import re
 
 import numpy as np
 import pytest
@@ -9,7 +10,7 @@ import pytest
 import hapticlink as hl
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.fmi import transfer
-from hapticlink.orchestrator.results import rows_file
+from hapticlink.orchestrator.results import rows_file, state_file
 from tests.little_fmus import slave
 from tests.orchestrator.c_fmus import c_fmu3
 from tests.orchestrator.foreign_scenes import ISOLATED, fmu_table, process, scene, wire_table
@@ -87,14 +88,7 @@ def test_a_line_that_was_cut_is_no_text(tmp_path):
 
 def test_a_run_with_texts_goes_on_from_its_state_to_the_same_bytes(tmp_path, monkeypatch):
     """Also in a process that has met none of them."""
-    text = RECORD.replace('"says"', '"says", "echo.*"') + fmu_table("says", "Says")
-    text += fmu_table("echo", "Echo", "rate = 16\n") + wire_table("says.word", "echo.said")
-    slave(
-        tmp_path, "Echo", ("input", {"said": "?"}), ("output", {"again": "?"}),
-        body="self.again = self.said", **SAVES,
-    )  # fmt: skip
-    says(tmp_path)
-    path = scene(tmp_path, text)
+    path = echoes(tmp_path)
     hl.run(path, out=tmp_path / "whole", figures=False, save=[0.28125])
     monkeypatch.setattr(transfer, "_TEXTS", {0: b""})
     state = tmp_path / "whole" / "at-0.28125.state"
@@ -133,4 +127,55 @@ def test_two_texts_with_one_number_are_told_apart(monkeypatch):
     monkeypatch.setattr(transfer, "NUMBER", 0)
     numbers = [transfer.number_of(text) for text in (b"one", b"two", b"one")]
     assert len({*numbers}) == 2
-    assert [transfer.known_texts()[n] for n in numbers] == [b"one", b"two", b"one"]
+    assert [transfer.text_of(n, "") for n in numbers] == [b"one", b"two", b"one"]
+
+
+def echoes(folder):
+    """A scene of which a text is held, and waits in a queue."""
+    text = 'delays = { "says.word -> echo.said" = { min = 0.1 } }\n'
+    text += RECORD.replace('"says"', '"says", "echo.*"') + fmu_table("says", "Says")
+    text += fmu_table("echo", "Echo", "rate = 16\n") + wire_table("says.word", "echo.said")
+    slave(
+        folder, "Echo", ("input", {"said": "?"}), ("output", {"again": "?"}),
+        body="self.again = self.said", **SAVES,
+    )  # fmt: skip
+    says(folder)
+    return scene(folder, text)
+
+
+def test_a_run_writes_its_own_texts_alone(tmp_path, monkeypatch):
+    """The same bytes in a process that has had other runs, also into the folder of one; a text that
+    this run never has is in no file."""
+    path, options = echoes(tmp_path), {"record.format": "rows"}
+    for folder, mode in (("a", "go"), ("b", "stop"), ("b", "go")):
+        if folder == "a":
+            monkeypatch.setattr(transfer, "_TEXTS", {0: b""})
+        given = options | {"fmu.says.start.mode": mode}
+        hl.run(path, given, out=tmp_path / folder, figures=False, save=[0.28125])
+    files = {p.name for p in (tmp_path / "a").iterdir()}
+    assert files == {*hl.load(tmp_path / "a").record.files}
+    assert files == {p.name for p in (tmp_path / "b").iterdir()}
+    assert files >= {"haptics.texts", "16hz.texts", "at-0.28125.state"}
+    for name in files - {"run.json"}:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes(), name
+    assert [*hl.load(tmp_path / "b")["says.word"]] == WORDS
+
+
+@pytest.mark.parametrize("what", ["output", "held", "waiting"])
+def test_a_state_whose_text_is_none_is_refused(tmp_path, what):
+    """One that waits in a queue as the FMU takes it."""
+    path = echoes(tmp_path)
+    hl.run(path, out=tmp_path / "out", figures=False, save=[0.28125])
+    state = tmp_path / "out" / "at-0.28125.state"
+    content, name = state_file.read_state(state), "says.word -> echo.said"
+    if what == "output":
+        content["fmus"]["says"]["outputs"]["word"] = 1.5
+    elif what == "held":
+        content["held"][name][:] = 1.5
+    else:
+        numbers, known = content["blocks"][name]["numbers"], {*map(float, transfer._TEXTS)}
+        numbers[[n in known and n != 0 for n in numbers]] = 1.5
+    state_file.write_state(state, content)
+    fault = hl.run(state, out=tmp_path / "later", figures=False).run["fault"]["message"]
+    assert re.search("said cannot be 1.5, the number" if what == "waiting" else "changed", fault)
+    assert "the number of no text" in fault

@@ -7,7 +7,7 @@ import pytest
 from fmpy import simulate_fmu
 
 import hapticlink as hl
-from hapticlink.orchestrator.base.errors import SceneFault
+from hapticlink.orchestrator.base.errors import InputFault, SceneFault
 from tests.little_fmus import slave
 
 RATE = 100
@@ -238,7 +238,27 @@ def test_a_text_that_is_fed_twice_is_refused(tmp_path, other):
         hl.run(path, figures=False)
 
 
-def test_a_number_takes_no_text(tmp_path):
-    of = "{ table = [[0.0, 'a'], [0.5, 'b']] }"
-    with pytest.raises(SceneFault, match=r"connection\[0\]\.from\.table.*takes a number"):
-        hl.run(scene(tmp_path, REAL, {"u": of}))
+@pytest.mark.parametrize("rows", ["[0.0, 'a']", "[0.0, 'a'], [0.5, 'b'], [0.7, 'c']"])
+def test_a_number_takes_no_text(tmp_path, rows):
+    """Said once, at the connection."""
+    with pytest.raises(SceneFault) as refused:
+        hl.run(scene(tmp_path, REAL, {"u": f"{{ table = [{rows}] }}"}))
+    assert str(refused.value).splitlines()[1:] == [
+        "  line 9: connection[0].from.table: 'a': u takes a number; connect a text to a String"
+    ]
+
+
+def test_a_table_of_texts_into_another_process_is_refused_before_the_run(tmp_path):
+    path = scene(tmp_path, TEXT, {"s": '{ table = [[0.0, "a"], [0.5, "b"]] }'}, SAYS)
+    path.write_text(path.read_text().replace("timing", "isolate = true\ntiming", 1))
+    with pytest.raises(InputFault, match=r"fed\.s is a text, .* within one process.*start value"):
+        hl.run(path, out=tmp_path / "out", figures=False)
+    assert not (tmp_path / "out" / "run.json").exists()
+
+
+def test_one_program_names_the_table_that_it_cannot_hold(tmp_path):
+    path = scene(tmp_path, TEXT, {"s": '{ table = [[0.0, "a"], [0.5, "b"]] }'}, SAYS)
+    with pytest.raises(InputFault) as refused:
+        hl.build(path, as_one=True, out=tmp_path / "one")
+    assert "connection[0].from.table: what happens at given times" in str(refused.value)
+    assert "[[at]]" not in str(refused.value)
