@@ -32,8 +32,8 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7504,
     "fmus": 2995,
-    "orchestrator": 16841,
-    "programs": 1046,
+    "orchestrator": 16892,
+    "programs": 1047,
     "analysis": 9129,
     "visualization": 3854,
     "api": 635,
