@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7505,
+    "components": 7509,
     "fmus": 2997,
     "orchestrator": 16841,
     "programs": 1045,
-    "analysis": 9171,
+    "analysis": 9176,
     "visualization": 3855,
     "api": 640,
     "commands": 1638,

@@ -193,17 +193,19 @@ def _reach(device: Device) -> tuple[Field, float]:
 
 def extents_along(device: Device) -> list[Range]:
     """The first and the last coordinate (m) along each direction that the device renders, the
-    others as at its start."""
-    from scipy.ndimage import label  # slow to load
-
+    others as at its start: between the points of a coarse grid sought once more."""
     model, (_, reach) = device_model(device), _reach(device)
-    ways = np.linspace(-reach, reach, POINTS)
     start, found = model.start_pose, list[Range]()
+    coarse = np.linspace(0.0, reach, POINTS // 2 + 1)
     for along in np.array(model.directions.rows):
-        margins = margin(device, start + np.outer(ways, along))
-        parts, _ = label(margins >= 0)
-        own = parts == parts[POINTS // 2]  # not where the device is assembled otherwise
-        found.append(_ends(along @ start + ways, np.where((margins < 0) | own, margins, -np.inf)))
+        ends = []
+        for way in (-along, along):
+            last = 0.0
+            for ahead in (coarse, coarse[1] * np.linspace(0.0, 1.0, POINTS)):
+                out = np.flatnonzero(margin(device, start + np.outer(last + ahead, way)) < 0)
+                last += ahead[max(out[0] - 1, 0) if out.size else -1]
+            ends.append(float(along @ (start + last * way)))
+        found.append((ends[0], ends[1]))
     return found
 
 
