@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2997,
     "orchestrator": 16841,
     "programs": 1045,
-    "analysis": 9176,
+    "analysis": 9178,
     "visualization": 3855,
     "api": 640,
     "commands": 1638,

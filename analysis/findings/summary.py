@@ -565,7 +565,9 @@ def _shorter(start: Sequence[float], balls: Sequence[int]) -> Sequence[float]:
 
     from hapticlink.components.linkage.rotations import shorten
 
-    return list(map(float, ca.evalf(shorten(start, ca.SX(len(start), 1), balls)[0]).elements()))
+    return list(
+        map(float, ca.evalf(shorten(ca.SX([*start]), ca.SX(len(start), 1), balls)[0]).elements())
+    )
 
 
 def _turn(change: float, unit: str) -> str:
