@@ -30,11 +30,11 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7504,
+    "components": 7508,
     "fmus": 2995,
     "orchestrator": 16892,
     "programs": 1047,
-    "analysis": 9129,
+    "analysis": 9136,
     "visualization": 3854,
     "api": 635,
     "commands": 1636,

@@ -559,9 +559,10 @@ def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterato
     given = {name: np.atleast_1d(start).tolist() for name, start in starts.items()}
     poses, far, coordinates = {}, [], iter(q)
     for joint in linkage["joint"]:
-        name, units = joint["name"], JOINT_TYPES[joint["type"]].units
-        poses[name] = list(islice(coordinates, len(units)))
-        for start, value, unit in zip(given.get(name, ()), poses[name], units, strict=False):
+        name, kind = joint["name"], JOINT_TYPES[joint["type"]]
+        poses[name] = list(islice(coordinates, kind.size))
+        starts = _shorter(given[name], kind.balls) if name in given else ()
+        for start, value, unit in zip(starts, poses[name], kind.units, strict=False):
             if abs(value - start) > SMALLEST_MOVE[unit]:
                 far.append(f"{name} by {_turn(value - start, unit)}")
     if far:
@@ -569,6 +570,19 @@ def describe_assembly(linkage: Mapping[str, Any], q: Sequence[float]) -> Iterato
             f"warning: the loops do not close at the given start; assembly moved {', '.join(far)}. "
             f"Given: {_pose(given)}. Assembled: {_pose({name: poses[name] for name in given})}"
         )
+
+
+def _shorter(start: Sequence[float], balls: Sequence[int]) -> Sequence[float]:
+    """Joint coordinates with the shorter vector of each ball, which a run has."""
+    if not balls:
+        return start
+    import casadi as ca  # slow to load
+
+    from hapticlink.components.linkage.rotations import shorten
+
+    return list(
+        map(float, ca.evalf(shorten(ca.SX([*start]), ca.SX(len(start), 1), balls)[0]).elements())
+    )
 
 
 def _turn(change: float, unit: str) -> str:

@@ -59,7 +59,7 @@ def _newton(map_: LiftedMap, period: LinearPeriod) -> Vector:
 def _residual(linear: Linearisation) -> float:
     """The largest change of a coordinate z over a period, relative to max(1, |z|)."""
     z = linear.V.T @ linear.point
-    return float((np.abs(linear.change) / np.maximum(1.0, np.abs(z))).max())
+    return float((np.abs(linear.change) / np.maximum(1.0, np.abs(z))).max(initial=0.0))
 
 
 def _step(linear: Linearisation) -> Vector:

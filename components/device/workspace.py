@@ -193,18 +193,21 @@ def _reach(device: Device) -> tuple[Field, float]:
 
 def extents_along(device: Device) -> list[Range | None]:
     """The first and the last coordinate (m) along each direction that the device renders, the
-    others as at its start; None where it has none."""
-    from scipy.ndimage import label  # slow to load
-
+    others as at its start, between the points of a coarse grid sought once more; None where the
+    start is outside of the workspace."""
     model, (_, reach) = device_model(device), _reach(device)
-    ways = np.linspace(-reach, reach, POINTS)
     start, found = model.start_pose, list[Range | None]()
+    coarse = np.linspace(0.0, reach, POINTS // 2 + 1)
+    inside = margin(device, start[None])[0] >= 0
     for along in np.array(model.directions.rows):
-        margins = margin(device, start + np.outer(ways, along))
-        parts, _ = label(margins >= 0)
-        own = parts == parts[POINTS // 2]  # not where the device is assembled otherwise
-        margins = np.where((margins < 0) | own, margins, -np.inf)
-        found.append(_ends(along @ start + ways, margins) if margins.max() >= 0 else None)
+        ends = []
+        for way in (-along, along):
+            last = 0.0
+            for ahead in (coarse, coarse[1] * np.linspace(0.0, 1.0, POINTS)):
+                out = np.flatnonzero(margin(device, start + np.outer(last + ahead, way)) < 0)
+                last += ahead[max(out[0] - 1, 0) if out.size else -1]
+            ends.append(float(along @ (start + last * way)))
+        found.append((ends[0], ends[1]) if inside else None)
     return found
 
 

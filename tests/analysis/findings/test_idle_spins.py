@@ -9,6 +9,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.analysis.findings.idle_spins import find_idle_spins, spinning
+from hapticlink.analysis.findings.summary import describe_assembly
 from hapticlink.components.dynamics.assembly import start_coordinates
 from hapticlink.components.specs.linkage import Body, Directions, OperationalPoint
 from tests.spatial_linkages import bennett, rssr, top
@@ -86,3 +87,12 @@ def test_a_run_that_finds_constrained_directions_says_it(tmp_path: Path, directi
         mobility = r["virtual_mechanism.Lambda_inv"][0].reshape(3, 3)
         assert np.linalg.eigvalsh(mobility)[-1] > 10 * np.linalg.eigvalsh(mobility)[-2]
         assert r["virtual_mechanism.n_constraints"][0] == 2
+
+
+def test_a_start_beyond_half_a_turn_is_not_moved_by_assembly():
+    """A ball turned by 264 degrees has the shorter vector, -16 v / v'v, from the first row on."""
+    joint = {"name": "ball", "type": "spherical"}
+    linkage = {"joint": [joint], "start": {"ball": [0.1, 0.2, 9.0]}}
+    shorter = -16.0 * np.array([0.1, 0.2, 9.0]) / 81.05
+    assert not [*describe_assembly(linkage, shorter)]
+    assert [*describe_assembly(linkage, shorter + 0.2)]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import hapticlink as hl
+from hapticlink.analysis.stability.equilibrium import _residual
 from hapticlink.analysis.stability.resting_scene import resting
 from hapticlink.analysis.stability.scene_variants import SceneVariants
 from tests.analysis.stability.test_virtual_coupling import HELD, POINT
@@ -100,3 +102,9 @@ def test_it_is_next_to_the_start_among_those_that_lie_side_by_side(
         handle = place.signal("haptic_device.x")
     assert handle == pytest.approx(start, abs=6e-3)
     assert handle[:2] == pytest.approx(start[:2], abs=5e-4)
+
+
+def test_without_a_free_coordinate_every_point_is_at_rest():
+    """As where a page's mouse holds a linkage in space of one motion."""
+    none = SimpleNamespace(V=np.zeros((2, 0)), point=np.zeros(2), change=np.zeros(0))
+    assert _residual(none) == 0.0
