@@ -35,7 +35,7 @@ from hapticlink.analysis.stability.poses import (
     Pose,
     choose_evenly_spaced,
     fault_of,
-    find_rest_poses,
+    find_rest_pose,
     is_hand_replaced,
     presses,
     rest,
@@ -172,7 +172,7 @@ def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Result
     poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
-            poses += find_rest_poses(read, read.linkage)
+            poses.append(find_rest_pose(read, read.linkage))
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
     return poses, run

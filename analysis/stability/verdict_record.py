@@ -223,7 +223,10 @@ class Stability:
         for name, case in held.items():
             if case.at and case.at.found:
                 F = ", ".join(f"{x:.3g}" for x in case.at.press)
-                yield f"{name}: {case.at.found}, with ({F}) N and N.m"
+                yield (
+                    f"{name}: {case.at.found}, where each hand stands still and gives ({F}) N and "
+                    "N.m, as in a run whose hand is set to that"
+                )
         if beside := [name for name, case in held.items() if case.neutral]:
             yield (
                 f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "
