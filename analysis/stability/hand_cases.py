@@ -239,8 +239,6 @@ def in_poses(
     cases: list[Case] = []
     without: dict[str, str] = {}
     for pose in poses:
-        if any(case.pose == pose.name for case in cases):
-            continue
         begin(pose.name)
         try:
             with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
@@ -257,8 +255,6 @@ def in_poses(
                 cases += [replace(case, saturated=saturated, at=at) for case in there]
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
-        else:
-            without.pop(pose.name, None)
     return cases, without
 
 

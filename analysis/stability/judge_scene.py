@@ -175,7 +175,7 @@ def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Result
             poses.append(find_rest_pose(read, read.linkage))
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
-    return poses, run
+    return [*{pose.name: pose for pose in poses}.values()], run
 
 
 def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
@@ -217,6 +217,7 @@ def _judge(
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
     visited, _ = visits(read)
+    named = {pose.name: pose for pose in visited}
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
@@ -227,8 +228,7 @@ def _judge(
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            pose = next(pose for pose in visited if pose.name == worst.pose)
-            if pose.leaves(read, hands[worst.hand]):
+            if named[worst.pose].leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
             worst = worst_case(cases)
@@ -236,10 +236,9 @@ def _judge(
         near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
-        judged = [pose for pose in visited if any(case.pose == pose.name for case in cases)]
         hardest = hardest_first(cases)
         margin, remedies = improvements(
-            read, judged, held, bounds, worst, visits, hardest, work, steps
+            read, named[worst.pose], held, bounds, worst, visits, hardest, work, steps
         )
         with linearisable(read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))

@@ -20,6 +20,7 @@ from hapticlink.analysis.stability.hands import (
     standing,
 )
 from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.modes import judged_modes, modes
 from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import StartPose
@@ -198,18 +199,18 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
         with suppress(InputFault, FmuFault):
             pose = _rested(simulate_for(LONGEST, read, free), linkage)
             with resting(read, free, at=pose.start) as place:
-                if place.decays:  # else the run creeps past it
+                all_modes = modes(place.period({}).linear, place.map.period)
+                if judged_modes(all_modes)[0].growth < 0.0:  # else the run creeps past it
                     pose = pose.at_equilibrium(place, linkage)
                     return replace(pose, title=LED, found=f"{told} rests there")
-    moves = f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s, and judged is"
+    moves = f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s"
     ends = (_average(run, linkage, since) for since in (1.0 - CALM, 1.0))
     near = [replace(pose, press=read.hand.wrench, title=LED) for pose in ends]
-    for under in ("under that wrench", "in which a firm grip holds it"):
-        for pose in near:
-            hand = free if under == "under that wrench" else pose.held
-            with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start) as place:
-                found = f"{moves} the equilibrium next to there {under}"
-                return replace(pose.at_equilibrium(place, linkage), found=found)
+    tried = [(pose, free, "under that wrench") for pose in near]
+    for pose, hand, how in [*tried, *((p, p.held, "in which a firm grip holds it") for p in near)]:
+        with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start) as place:
+            found = f"{moves}, and judged is the equilibrium next to there {how}"
+            return replace(pose.at_equilibrium(place, linkage), found=found)
     return near[0]
 
 

@@ -16,7 +16,7 @@ from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.hands import spring_hand
 from hapticlink.analysis.stability.lifted_map import LiftedMap, long_enough, open_lifted_map
 from hapticlink.analysis.stability.linear_period import LinearPeriod
-from hapticlink.analysis.stability.modes import DRIFT, Mode, judged_modes, kind, modes
+from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import StartPose, linearisable
@@ -118,11 +118,6 @@ class RestingScene:
         return bool(counted) and not any(
             mode.growth > 0.0 and _is_felt(period.traced(mode)) for mode in counted
         )
-
-    @property
-    def decays(self) -> bool:
-        """Whether at the `equilibrium` no mode grows, neutral ones aside."""
-        return judged_modes(modes(self._home.linear, self.map.period))[0].growth < 0.0
 
     def signal(self, port: str) -> Matrix:
         """The values of an output `fmu.port` at the `equilibrium`; none without such an output."""

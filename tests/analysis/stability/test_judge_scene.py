@@ -32,7 +32,7 @@ from hapticlink.analysis.stability.poses import (
     Pose,
     at_pose,
     choose_evenly_spaced,
-    find_rest_poses,
+    find_rest_pose,
     simulate_scene,
     visited_poses,
 )
@@ -108,7 +108,7 @@ def test_slopes_that_are_taken_over_stay_within_what_a_growth_rate_is_uncertain(
     manifolds change on the way to the equilibrium."""
     read = hl.scene("closed-loop-ideal", {"hold": "foh", "graphics.rate": 128})
     assert read.linkage is not None
-    poses = find_rest_poses(read, read.linkage)[:1]
+    poses = [find_rest_pose(read, read.linkage)]
     taken_over, _ = in_poses(read, poses, HANDS, DRIFT)
     monkeypatch.setattr(forward_sensitivity, "SAME", 1e-13)
     monkeypatch.setattr(forward_sensitivity, "is_polynomial", lambda hold: False)
@@ -293,7 +293,7 @@ def test_gains_without_an_equilibrium_are_not_known_to_be_unstable(
     monkeypatch.setattr(margin_and_remedy, "InHands", Faulty)
     pose = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)[0]
     case = Case(pose.name, "firm grip", -1.0, 0.0, 1.0, "oscillation", "stable", ())
-    margin, _ = improvements(slider, [pose], HANDS, DRIFT, case, lambda _: ([pose], ""))
+    margin, _ = improvements(slider, pose, HANDS, DRIFT, case, lambda _: ([pose], ""))
     assert margin.stiffness == pytest.approx(1.3, rel=0.02)
     assert ("stiffness" not in margin.not_searched_further) == known
 
@@ -354,7 +354,7 @@ def test_inside_of_each_margin_a_changed_scene_is_stable_and_outside_unstable(
         return cases[0].verdict == "stable"
 
     (case,), _ = in_poses(slider, poses, hands, DRIFT)
-    margin, _ = improvements(slider, poses, hands, DRIFT, case, lambda _: (poses, ""))
+    margin, _ = improvements(slider, poses[0], hands, DRIFT, case, lambda _: (poses, ""))
     assert "rate" not in margin.not_searched_further
     assert margin.stiffness
     assert margin.delay is not None
@@ -518,7 +518,7 @@ def test_a_mechanism_that_falls_over_is_said_to_do_so_by_itself(slider: hl.Scene
     def fails(changed: hl.Scene) -> NoReturn:
         raise hl.InputFault("its run fails")
 
-    margin, remedies = improvements(falls, poses, hands, DRIFT, case, fails)
+    margin, remedies = improvements(falls, poses[0], hands, DRIFT, case, fails)
     assert margin.alone == pytest.approx(growth, rel=1e-3)
     assert remedies == ()  # those whose run fails are none
     poses = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)
@@ -591,7 +591,7 @@ def test_softer_gains_stand_beside_another_remedy() -> None:
     hands = {"firm grip": HANDS["firm grip"]}
     (case,), _ = in_poses(scene, poses, hands, DRIFT)
     assert case.verdict == "unstable"
-    margin, remedies = improvements(scene, poses, hands, DRIFT, case, lambda _: (poses, ""))
+    margin, remedies = improvements(scene, poses[0], hands, DRIFT, case, lambda _: (poses, ""))
     assert margin.stiffness
     softer = f"{100 * margin.stiffness / SAFE:.4g}"
     found = [r for r in remedies if f"teleoperation.stiffness=[{softer}" in r.options[0]]
