@@ -206,8 +206,9 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
     moves = f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s"
     ends = (_average(run, linkage, since) for since in (1.0 - CALM, 1.0))
     near = [replace(pose, press=read.hand.wrench, title=LED) for pose in ends]
-    tried = [(pose, free, "under that wrench") for pose in near]
-    for pose, hand, how in [*tried, *((p, p.held, "in which a firm grip holds it") for p in near)]:
+    tried: list[tuple[Pose, Options, str]] = [(p, free, "under that wrench") for p in near]
+    tried += [(p, p.held, "in which a firm grip holds it") for p in near]
+    for pose, hand, how in tried:
         with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start) as place:
             found = f"{moves}, and judged is the equilibrium next to there {how}"
             return replace(pose.at_equilibrium(place, linkage), found=found)
