@@ -59,13 +59,13 @@ FIRM = {"type": "spring", "stiffness": [1000.0, 1000.0, 3.0], "damping": [5.0, 5
 SCENE = {"graphics.rate": 64, "hand": {**FIRM, "target": [[0.0, *POINT]]}}
 LEADING = 6
 COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
-    ("closed-loop-ideal", {}, (18, 85, 2270)),
-    ("closed-loop-ideal", {"hold": "foh"}, (18, 108, 5206)),
-    ("serial", {}, (31, 147, 1828)),
-    ("enclosure", {}, (17, 110, 1874)),
-    ("two-users", {}, (16, 167, 2504)),
-    ("closed-loop-direct", {}, (42, 343, 4058)),
-    ("closed-loop-direct", {"hold": "foh"}, (42, 474, 6985)),
+    ("closed-loop-ideal", {}, (19, 77, 3772)),
+    ("closed-loop-ideal", {"hold": "foh"}, (19, 86, 6114)),
+    ("serial", {}, (31, 147, 1916)),
+    ("enclosure", {}, (17, 110, 1700)),
+    ("two-users", {}, (14, 95, 1436)),
+    ("closed-loop-direct", {}, (42, 252, 3824)),
+    ("closed-loop-direct", {"hold": "foh"}, (45, 292, 6424)),
 ]
 
 
