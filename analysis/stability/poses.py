@@ -304,8 +304,7 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
     table, device = _read_poses(run), table_of(run, HANDLE_POSE)
 
     def mean(values: Matrix) -> Vector:
-        n = len(values)
-        average: Vector = values[min(n - 1, int(since * n)) :].mean(axis=0)
+        average: Vector = values[min(len(values) - 1, int(since * len(values))) :].mean(axis=0)
         return average
 
     return replace(
