@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2995,
     "orchestrator": 16892,
     "programs": 1047,
-    "analysis": 9136,
+    "analysis": 9130,
     "visualization": 3854,
     "api": 635,
     "commands": 1636,

@@ -292,7 +292,7 @@ class ForwardSensitivity:
         law = hold.row, parts.relation, parts.matrix, hold.c.n, beside
         about = *law, size + len(reads), operation.ahead, base
         known = self.work.slopes.setdefault((POWERS, *about, since), [])
-        if known and is_linear(hold):
+        if known and not parts.beside:
             return known[0].J
         at = np.concatenate([block.save().numbers, board[reads]])
         wide = SAME * np.maximum(1.0, np.abs(at))

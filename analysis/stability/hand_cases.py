@@ -232,16 +232,14 @@ def in_poses(
     poses: Sequence[Pose],
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
-    begin: Callable[[Pose], object] = lambda pose: None,
+    begin: Callable[[str], object] = lambda pose: None,
     work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
     """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
     cases: list[Case] = []
     without: dict[str, str] = {}
     for pose in poses:
-        if any(case.pose == pose.name for case in cases):
-            continue
-        begin(pose)
+        begin(pose.name)
         try:
             with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
                 # A constant wrench slides off what it presses on, whatever the loop does.
@@ -257,8 +255,6 @@ def in_poses(
                 cases += [replace(case, saturated=saturated, at=at) for case in there]
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
-        else:
-            without.pop(pose.name, None)
     return cases, without
 
 

@@ -35,7 +35,7 @@ from hapticlink.analysis.stability.poses import (
     Pose,
     choose_evenly_spaced,
     fault_of,
-    find_rest_poses,
+    find_rest_pose,
     is_hand_replaced,
     presses,
     rest,
@@ -172,10 +172,10 @@ def _visit_poses(read: Scene, count: int, grid: int) -> tuple[list[Pose], Result
     poses = choose_evenly_spaced(run, read.linkage, count)
     if presses(read):
         with suppress(InputFault):
-            poses += find_rest_poses(read, read.linkage)
+            poses.append(find_rest_pose(read, read.linkage))
     if grid:
         poses += grid_poses(run, read, read.linkage, grid)
-    return poses, run
+    return [*{pose.name: pose for pose in poses}.values()], run
 
 
 def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> Stability:
@@ -217,21 +217,18 @@ def _judge(
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
     visited, _ = visits(read)
+    named = {pose.name: pose for pose in visited}
     steps.expected += len(visited) + len(MARGINS)
-    tried: dict[str, Pose] = {}  # of several of one name the last one, which has the cases
-
-    def begin(pose: Pose) -> None:
-        tried[pose.name] = pose
-        steps.begin(f"pose at {pose.name}")
-
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
-        cases, without = in_poses(read, visited, hands, bounds, begin, work)
+        cases, without = in_poses(
+            read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
+        )
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            if tried[worst.pose].leaves(read, hands[worst.hand]):
+            if named[worst.pose].leaves(read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
             worst = worst_case(cases)
@@ -239,10 +236,9 @@ def _judge(
         near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
-        judged = [tried[name] for name in dict.fromkeys(case.pose for case in cases)]
         hardest = hardest_first(cases)
         margin, remedies = improvements(
-            read, judged, held, bounds, worst, visits, hardest, work, steps
+            read, named[worst.pose], held, bounds, worst, visits, hardest, work, steps
         )
         with linearisable(read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))

@@ -81,7 +81,7 @@ class Margin:
 
 def improvements(
     read: Scene,
-    poses: Sequence[Pose],
+    pose: Pose,
     hands: Mapping[str, Hand | None],
     bounds: Bounds,
     worst: Case,
@@ -90,10 +90,9 @@ def improvements(
     work: SharedWork | None = None,
     steps: Steps | None = None,
 ) -> tuple[Margin, tuple[Remedy, ...]]:
-    """The margin in the `worst` pose, and what ends its instability or grows less, as `remedies`;
-    nothing where it is stable. visited: gives the poses in which the scene with other options is
-    judged, those that are named in `hardest` first."""
-    pose = next(pose for pose in poses if pose.name == worst.pose)
+    """The margin in the `pose` of the `worst` case, and what ends its instability or grows less, as
+    `remedies`; nothing where it is stable. visited: gives the poses in which the scene with other
+    options is judged, those that are named in `hardest` first."""
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
     search = _Search(read, pose, held, bounds, work or SharedWork(), steps or Steps(None, 0))

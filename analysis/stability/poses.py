@@ -20,6 +20,7 @@ from hapticlink.analysis.stability.hands import (
     standing,
 )
 from hapticlink.analysis.stability.lifted_map import hyperperiod
+from hapticlink.analysis.stability.modes import judged_modes, modes
 from hapticlink.analysis.stability.resting_scene import RestingScene, contact_force, resting
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.smooth_scene import StartPose
@@ -36,6 +37,7 @@ from hapticlink.orchestrator.base.signal_names import (
     HAND,
     HAND_WRENCH,
     HANDLE_POSE,
+    HANDLE_VELOCITY,
     JOINT_COORDINATES,
     JOINT_RATES,
     POINT_POSE,
@@ -55,8 +57,8 @@ SETTLED_BY = 5.0
 LONGEST, LATE = 60.0, 0.1
 """Time (s) after which a run that has not come to rest does not, and its last part."""
 AT_REST, NEARLY = 1e-3, 1.0
-"""Rates (rad/s, m/s) of the fastest joint in that part, up to which a run rests, and up to which a
-shorter one may."""
+"""Rates (rad/s, m/s) of the joints and the handle in that part, up to which a run rests, and up to
+which a shorter one may."""
 LED = "where its wrench leads"
 LEAVING, OFF = 20.0, 2e-4
 """Duration (s) of a run that shows where a divergence leads, and how far off the hand is at first
@@ -177,33 +179,40 @@ def choose_evenly_spaced(run: Results, linkage: Linkage, count: int) -> list[Pos
     return [_pose(run, linkage, i) for i in moments]
 
 
-def find_rest_poses(read: Scene, linkage: Linkage) -> list[Pose]:
-    """Where the constant wrench of a scene leads a damped handle: at the end of a run, and about
-    its mean if there is no equilibrium nearby. Without topology controller equilibria lie side by
+def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
+    """Where the constant wrench of a scene leads a damped handle: the equilibrium under that wrench
+    next to the mean over the end of a run, or to its last pose; or, where none is found, one in
+    which a firm grip holds it; or that mean. Without topology controller equilibria lie side by
     side: then the one in which the run rests, if it does, with the scene's own damping if there is
     any. Raises InputFault where the run fails."""
     assert isinstance(read.hand, ConstantHand)
     single = bool(read.controller and read.controller.topology)
     own = any(read.hand.damping or ()) and not single
     damping = read.hand.damping if own else by_direction(linkage.space, SETTLED_BY, TURNING)
-    options = {"type": "constant", "wrench": read.hand.wrench, "damping": damping}
+    free = {"hand": {"type": "constant", "wrench": read.hand.wrench, "damping": damping}}
     told = f"its run{'' if own else f' with {SETTLED_BY:g} N.s/m of damping'}"
-    run = simulate_for(SETTLING, read, {"hand": options})
+    run = simulate_for(SETTLING, read, free)
     if run.record.fault:
         raise InputFault(f"{told} fails: {run.record.fault.message}")
-    speed = float(np.abs(_late_rates(run)).max())
+    speed = float(np.abs(_fastest(run)).max())
     if speed <= NEARLY and not single:
         with suppress(InputFault, FmuFault):
-            pose = _rested(simulate_for(LONGEST, read, {"hand": options}), linkage)
-            with resting(read, {"hand": options}, at=pose.start) as place:
-                pose = pose.at_equilibrium(place, linkage)
-            return [replace(pose, title=LED, found=f"{told} rests there")]
-    found = (
-        f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s, and judged is "
-        "the equilibrium next to there in which a firm grip holds it"
-    )
-    near = (_average(run, linkage, since) for since in (1.0, 1.0 - CALM))
-    return [replace(pose, press=read.hand.wrench, title=LED, found=found) for pose in near]
+            pose = _rested(simulate_for(LONGEST, read, free), linkage)
+            with resting(read, free, at=pose.start) as place:
+                all_modes = modes(place.period({}).linear, place.map.period)
+                if judged_modes(all_modes)[0].growth < 0.0:  # else the run creeps past it
+                    pose = pose.at_equilibrium(place, linkage)
+                    return replace(pose, title=LED, found=f"{told} rests there")
+    moves = f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s"
+    ends = (_average(run, linkage, since) for since in (1.0 - CALM, 1.0))
+    near = [replace(pose, press=read.hand.wrench, title=LED) for pose in ends]
+    tried: list[tuple[Pose, Options, str]] = [(p, free, "under that wrench") for p in near]
+    tried += [(p, p.held, "in which a firm grip holds it") for p in near]
+    for pose, hand, how in tried:
+        with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start) as place:
+            found = f"{moves}, and judged is the equilibrium next to there {how}"
+            return replace(pose.at_equilibrium(place, linkage), found=found)
+    return near[0]
 
 
 def rest(read: Scene, linkage: Linkage) -> Pose:
@@ -217,27 +226,26 @@ def _rested(run: Results, linkage: Linkage) -> Pose:
     """The pose in which a run of LONGEST rests. Raises InputFault where it does not."""
     if run.record.fault:
         raise InputFault(f"the run does not come to rest: {run.record.fault.message}")
-    rates = _late_rates(run)
-    fastest = np.abs(rates).max(axis=0)
-    if (speed := float(fastest.max())) > AT_REST:
-        joint = rates[:, int(np.argmax(fastest))]
-        hertz = np.count_nonzero(np.diff(np.sign(joint))) / 2 / (LATE * LONGEST)
+    fastest = _fastest(run)
+    if (speed := float(np.abs(fastest).max())) > AT_REST:
+        hertz = np.count_nonzero(np.diff(np.sign(fastest))) / 2 / (LATE * LONGEST)
         raise InputFault(
-            f"the run does not come to rest in {LONGEST:g} s: its joints still move at up to "
+            f"the run does not come to rest in {LONGEST:g} s: it still moves at up to "
             f"{speed:.2g} rad/s or m/s, at {hertz:.2g} Hz; an equilibrium takes damping, or a hand "
             "that holds it"
         )
-    tables = ((table_of(run, port), port) for port in (HANDLE_POSE, HAND_WRENCH))
-    handle, press = (tuple(at[port][-1].tolist()) if at else None for at, port in tables)
-    end = _average(run, linkage, 1.0)
-    return replace(end, handle=handle, press=press or (0.0, 0.0, 0.0))
+    hand = table_of(run, HAND_WRENCH)
+    press = tuple(hand[HAND_WRENCH][-1].tolist()) if hand else (0.0, 0.0, 0.0)
+    return replace(_average(run, linkage, 1.0), press=press)
 
 
-def _late_rates(run: Results) -> Matrix:
-    """The rates of the joints in the last part of a run, (k, n)."""
-    table = _read_poses(run)
-    rates: Matrix = table[JOINT_RATES][int((1.0 - LATE) * len(table["time"])) :]
-    return rates
+def _fastest(run: Results) -> Vector:
+    """The rates, in the last part of a run, of the joint or the direction of the handle that is
+    then the fastest."""
+    handle = table_of(run, HANDLE_VELOCITY)
+    rates = [_read_poses(run)[JOINT_RATES], *([handle[HANDLE_VELOCITY]] if handle else [])]
+    late: list[Vector] = [v for each in rates for v in each[int((1 - LATE) * len(each)) :].T]
+    return max(late, key=lambda v: float(np.abs(v).max()))
 
 
 @contextmanager
@@ -267,9 +275,8 @@ def _own_equilibria(read: Scene) -> Iterator[tuple[Pose | None, Hand | None]]:
         yield None, None
     if read.linkage is None or read.hand is None or is_hand_replaced(read):
         return
-    leads = find_rest_poses if presses(read) else lambda *scene: [rest(*scene)]
-    for pose in leads(read, read.linkage):
-        yield pose, linearise_hand(read.hand)
+    leads = find_rest_pose if presses(read) else rest
+    yield leads(read, read.linkage), linearise_hand(read.hand)
 
 
 def presses(read: Scene) -> bool:
@@ -292,16 +299,19 @@ def visited_poses(run: Results) -> tuple[Matrix, Matrix]:
 
 
 def _average(run: Results, linkage: Linkage, since: float) -> Pose:
-    """The mean pose over the part of a run from `since` (0 to 1) of it on. Raises InputFault as
-    `choose_evenly_spaced`."""
-    table = _read_poses(run)
-    n = len(table["time"])
-    part = slice(min(n - 1, int(since * n)), n)
-    end = _pose(run, linkage, n - 1)
+    """The mean pose, of the handle, too, over the part of a run from `since` (0 to 1) of it on.
+    Raises InputFault as `choose_evenly_spaced`."""
+    table, device = _read_poses(run), table_of(run, HANDLE_POSE)
+
+    def mean(values: Matrix) -> Vector:
+        average: Vector = values[min(len(values) - 1, int(since * len(values))) :].mean(axis=0)
+        return average
+
     return replace(
-        end,
-        joints=by_joint(linkage, table[JOINT_COORDINATES][part].mean(axis=0)),
-        point=tuple(table[POINT_POSE][part].mean(axis=0).tolist()),
+        _pose(run, linkage, len(table["time"]) - 1),
+        joints=by_joint(linkage, mean(table[JOINT_COORDINATES])),
+        point=tuple(mean(table[POINT_POSE]).tolist()),
+        handle=tuple(mean(device[HANDLE_POSE]).tolist()) if device else None,
     )
 
 

@@ -111,12 +111,7 @@ class Trial:
 
     def _judge_in(self, pose: Pose) -> None:
         found, why = in_poses(
-            self._changed,
-            [pose],
-            self._hands,
-            self._bounds,
-            lambda at: self._tell(at.name),
-            self._work,
+            self._changed, [pose], self._hands, self._bounds, self._tell, self._work
         )
         self._cases += found
         self._without.pop(pose.name, None)

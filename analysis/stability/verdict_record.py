@@ -222,8 +222,8 @@ class Stability:
         held = {case.pose: case for case in self.cases if case.at and not case.free}
         for name, case in held.items():
             if case.at and case.at.found:
-                F = ", ".join(f"{x:.3g}" for x in case.at.press)
-                yield f"{name}: {case.at.found}, with ({F}) N and N.m"
+                F = ", ".join(f"{round(x, 9) + 0.0:.3g}" for x in case.at.press)
+                yield f"{name}: {case.at.found}; each hand stands still there with ({F}) N and N.m"
         if beside := [name for name, case in held.items() if case.neutral]:
             yield (
                 f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "

@@ -19,7 +19,7 @@ class OfGrowth(InHands):
         self._seconds = 1.0
 
     def _leading(self, hand):  # type: ignore[no-untyped-def]
-        return self._mode, self
+        return self._mode, self, 0
 
     def traced(self, mode: Mode) -> Mode:
         return mode

@@ -10,8 +10,8 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.stability.hand_cases import Case, in_poses
 from hapticlink.analysis.stability.hands import OWN_FREE, hands_in, linearise_hand
-from hapticlink.analysis.stability.modes import DRIFT
-from hapticlink.analysis.stability.poses import Pose, find_rest_poses
+from hapticlink.analysis.stability.modes import DRIFT, modes
+from hapticlink.analysis.stability.poses import LED, Pose, at_pose, find_rest_pose
 
 WRENCH = (-0.3, 0.2, 0.0)
 TWO_LINKS = {
@@ -51,7 +51,7 @@ def led() -> tuple[Pose, dict[str, Case]]:
     read = hl.scene("closed-loop-ideal", BESIDE)
     assert read.linkage is not None
     assert read.hand is not None
-    (pose,) = find_rest_poses(read, read.linkage)
+    pose = find_rest_pose(read, read.linkage)
     hands = {"firm grip": hands_in(read.space)["firm grip"], OWN_FREE: linearise_hand(read.hand)}
     cases, without = in_poses(read, [pose], hands, DRIFT)
     assert not without
@@ -82,18 +82,79 @@ def test_there_the_hand_gives_the_wrench_of_the_scene_and_some_direction_is_free
         assert case.neutral
 
 
-def test_a_run_that_keeps_moving_is_told_with_the_wrench_at_the_equilibrium_beside_it() -> None:
+def test_a_run_that_keeps_moving_is_told_and_judged_at_the_equilibrium_under_its_wrench() -> None:
     found = hl.stability("closed-loop-ideal")
-    told = next(line for line in found.lines() if line.startswith("where its wrench leads: "))
+    told = next(line for line in found.lines() if line.startswith(f"{LED}: "))
     assert "its run with 5 N.s/m of damping still moves at up to 3.2 rad/s" in told
-    F = next(case.at.press for case in found.cases if case.pose == found.poses[-1].name and case.at)
-    assert told.endswith(f"with ({F[0]:.3g}, {F[1]:.3g}, {F[2]:.3g}) N and N.m")
-    assert abs(F[0] + 0.5) > 0.005
+    (pose,) = (pose for pose in found.poses if pose.name == LED)
+    wrench = hl.scene("closed-loop-ideal").hand.wrench  # type: ignore[union-attr]
+    for case in found.cases:
+        if case.pose == LED:
+            assert case.at is not None
+            assert case.at.press == pytest.approx(wrench, abs=1e-9)
+            assert case.at.point == pytest.approx(pose.point, abs=1e-9)
     run = hl.run(
         "closed-loop-ideal", {"duration": 10.0, "hand.damping": [5.0, 5.0, 0.005]}, figures=False
     )
     rates = run["virtual_mechanism.qd"][-512:]
     assert np.abs(rates).max() == pytest.approx(3.2, abs=0.05)
+    free = next(case for case in found.cases if case.pose == LED and case.free)
+    assert free.growth == pytest.approx(_growth_of_run(pose, wrench), rel=0.01)
+
+
+def _growth_of_run(pose: Pose, wrench: tuple[float, ...]) -> float:
+    """The growth rate (1/s) of a run that begins in a pose, with a push at first."""
+    pushed = [[0.0, wrench[0] + 1e-6, *wrench[1:]], [0.05, *wrench]]
+    hand = {"type": "profile", "table": pushed, "interpolation": "hold"}
+    options = {**pose.started, "hand": hand, "duration": 80.0, "stop_when": ""}
+    x = hl.run("closed-loop-ideal", options, figures=False)["haptic_device.x_true"]
+    moved = np.abs(np.diff(x[::32], axis=0)).max(axis=1)[320:]
+    highest = moved.reshape(-1, 160).max(axis=1)  # over 10 s, three periods and a half
+    return float(np.polyfit(10.0 * np.arange(len(highest)), np.log(highest), 1)[0])
+
+
+STRETCHED: dict[str, Any] = {
+    "haptics.rate": 1000,
+    "graphics.rate": "1000/11",
+    "hold": "foh",
+    "controller.teleoperation.stiffness": [56.67, 56.67, 0.4245],
+    "controller.teleoperation.damping": [6.455, 6.455, 0.0559],
+    "controller.topology": False,
+    "controller.bias": "full",
+    "linkage.gravity": [0.0, -0.84],
+    "linkage.body.link4.mass": 2.1613,
+    "hand": {"type": "constant", "wrench": [0.152, 0.128, 0.0]},
+}
+"""Of this five-bar one arm is almost stretched where the wrench leads it, and the handle creeps."""
+
+
+def test_a_run_whose_handle_creeps_on_is_not_said_to_rest_and_no_grip_grows_there() -> None:
+    read = hl.scene("closed-loop-ideal", STRETCHED)
+    assert read.linkage is not None
+    pose = find_rest_pose(read, read.linkage)
+    assert "still moves" in pose.found
+    run = hl.run(
+        "closed-loop-ideal",
+        STRETCHED | {"duration": 60.0, "stop_when": "", "hand.damping": [5.0, 5.0, 0.005]},
+        figures=False,
+    )
+    assert np.abs(run["virtual_mechanism.qd"][-300:]).max() < 1e-3  # at rest, the handle is not:
+    assert np.linalg.norm(np.ptp(run["haptic_device.x_true"][-10000:, :2], axis=0)) > 0.01
+    with at_pose(read, pose) as (place, _):
+        found = modes(place.period({}).linear, place.map.period)
+        rest = place.equilibrium
+        moving = place.map.moving
+        largest = []
+        for way in (1e-7, -1e-7):
+            z = rest.copy()
+            z[moving] += way * np.random.default_rng(4).normal(size=len(moving))
+            sizes = []
+            for _ in range(round(20.0 / place.map.period)):
+                z = place.map.image(z)
+                sizes.append(np.abs(z - rest)[moving].max())
+            largest.append(max(sizes[len(sizes) // 2 :]) / max(sizes[: len(sizes) // 2]))
+    assert max(mode.growth for mode in found if not mode.neutral) < 0.01
+    assert max(largest) < 2.0
 
 
 def test_equilibria_side_by_side_are_told_where_nothing_resists_and_only_there() -> None:
