@@ -120,6 +120,8 @@ def trial(
             pass
     reference = dict(flat(read.tables())).get(asked.level) if asked.level else None
     folder = folders.ensure(Path(out))
+    if (folder / ANSWERS).exists():
+        raise InputFault(f"{folder / ANSWERS}: has answers of earlier trials: name another --out")
 
     def present(number: int, place: int, settings: Settings) -> None:
         index = asked.settings.index(settings) if settings else None

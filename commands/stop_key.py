@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from hapticlink.orchestrator.base import interrupt
 from hapticlink.orchestrator.base.terminal_output import say
 
 
@@ -33,8 +34,14 @@ def stop_key() -> Iterator[Callable[[], bool] | None]:
             termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, before)
 
 
+def read_line() -> str:
+    """A line that somebody types, "" where the input has ended; Ctrl-C raises Interrupted."""
+    with interrupt.at_once():
+        return sys.stdin.readline()
+
+
 def wait_for_enter(what: str) -> None:
     """Say what to do, and wait until Enter says that it is done; without a terminal go on."""
     if sys.stdin and sys.stdin.isatty():
         say(f"{what}, then press Enter", file=sys.stderr)
-        sys.stdin.readline()
+        read_line()

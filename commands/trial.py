@@ -18,6 +18,7 @@ from hapticlink.commands.options import (
 )
 from hapticlink.commands.page_server import LOCAL, PageAddress
 from hapticlink.commands.run import Device
+from hapticlink.commands.stop_key import read_line
 from hapticlink.commands.sweep import Vary
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.terminal_output import say
@@ -104,7 +105,7 @@ def _ask(question: str, answers: str) -> str:
     """Ask in the terminal."""
     while True:
         say(f"{question} [{answers}]", file=sys.stderr)
-        line = sys.stdin.readline()
+        line = read_line()
         given = line.strip().lower()
         if not line:
             return "q"

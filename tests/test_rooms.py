@@ -32,12 +32,12 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7508,
     "fmus": 2995,
-    "orchestrator": 16892,
+    "orchestrator": 16906,
     "programs": 1047,
     "analysis": 9130,
     "visualization": 3854,
-    "api": 635,
-    "commands": 1636,
+    "api": 637,
+    "commands": 1639,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

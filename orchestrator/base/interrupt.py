@@ -44,6 +44,26 @@ def raise_if_interrupted(time: float | None = None) -> None:
         raise Interrupted(time)
 
 
+@contextmanager
+def at_once() -> Iterator[None]:
+    """Context of a call that waits for a person, which a signal ends: raises Interrupted there. Of
+    the main thread, with signals deferred."""
+
+    def take(*_: object) -> None:
+        global _count
+        _count += 1
+        raise_if_interrupted()
+
+    raise_if_interrupted()
+    handled = (number for number in SIGNALS if callable(signal.getsignal(number)))
+    deferred = {number: signal.signal(number, take) for number in handled}
+    try:
+        yield
+    finally:
+        for number, handler in deferred.items():
+            signal.signal(number, handler)
+
+
 def add(action: Action) -> None:
     """Registers an action for a second signal, until it is removed."""
     _actions.append(action)

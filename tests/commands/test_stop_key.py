@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import io
 import os
+import signal
+import subprocess
 import sys
+import time
 
 import pytest
 
@@ -52,3 +55,33 @@ def test_enter_says_that_it_is_done(keyboard, capsys):
     keyboard(b"\n")
     wait_for_enter("hold the handle in its home pose")
     assert capsys.readouterr().err == "hold the handle in its home pose, then press Enter\n"
+
+
+def test_ctrl_c_ends_a_trial_that_waits_for_an_answer(tmp_path):
+    """And answers that are there are not written over."""
+    command = [sys.executable, "-m", "hapticlink", "trial", "closed-loop-2diy", "--out", "made"]
+    options = ("--vary", "graphics.rate=16", "--device", "simulated-board")
+    (tmp_path / "made").mkdir()
+
+    def start() -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [*command, *options], cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+
+    with start() as trial:
+        assert trial.stderr
+        while not (said := trial.stderr.readline()).endswith("[y/q]\n"):
+            assert said
+        time.sleep(0.2)
+        trial.send_signal(signal.SIGINT)
+        try:
+            assert trial.wait(20) == 1
+            assert trial.stderr.read() == "hapticlink: interrupted\n"
+        finally:
+            trial.kill()
+    (tmp_path / "made" / "answers.csv").write_text("trial,graphics.rate,varied,answer,right\n")
+    with start() as trial:
+        said = trial.communicate(timeout=60)[1]
+    assert trial.returncode == 2
+    assert "answers.csv: has answers of earlier trials: name another --out" in said
