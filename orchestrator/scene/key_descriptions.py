@@ -86,7 +86,7 @@ def _word(kind: Any, quantity: Quantity | None) -> str:
     inner = words(entries[0])
     if typing.get_origin(entries[0]) is typing.Literal:
         return f"{many} {inner}"
-    if typing.get_origin(entries[0]) is tuple:
+    if any(typing.get_origin(branch) is tuple for branch, _ in find_quantities(entries[0])):
         return f"{many} rows of {inner}"
     return f"{many} " + {"a table": "tables", "a text": "texts"}.get(inner, "numbers")
 
