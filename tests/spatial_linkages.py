@@ -18,6 +18,7 @@ from hapticlink.components.specs.linkage import (
 
 __all__ = [
     "BALL_AND_SLIDER",
+    "BAR_IN_HAND",
     "DELTA",
     "bennett",
     "bricard",
@@ -57,6 +58,44 @@ child = "block"
 axis = [1.0, 2.0, 2.0]
 """
 """The [linkage] of a scene: a bar on a ball, and a block that slides beside it."""
+
+BAR_IN_HAND = """
+title = "A bar on a universal joint, in the hand"
+duration = 0.25
+graphics.rate = 32
+
+[linkage]
+operational_point = { body = "bar", at = [0.0, 0.0, 0.1] }
+
+[[linkage.body]]
+name = "bar"
+mass = 0.3
+inertia = 1e-3
+center = [0.0, 0.0, 0.05]
+
+[[linkage.joint]]
+name = "joint"
+type = "universal"
+child = "bar"
+at_parent = [0.0, 0.0, -0.1]
+axis = [1.0, 0.0, 0.0]
+second_axis = [0.0, 1.0, 0.0]
+
+[controller]
+bias = "full"
+
+[controller.teleoperation]
+stiffness = [200.0, 200.0, 200.0]
+damping = [20.0, 20.0, 20.0]
+
+[hand]
+type = "constant"
+wrench = [0.2, -0.1, 0.3]
+
+[device]
+extends = "%s"
+"""
+"""A scene whose device `% NAME` names."""
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 

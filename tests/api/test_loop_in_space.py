@@ -8,6 +8,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.visualization.figures import run_figures
+from tests.spatial_linkages import BAR_IN_HAND
 
 FAST = {"haptics__rate": 512, "graphics__rate": 64, "duration": 0.0625}
 """As the observer wants it."""
@@ -67,49 +68,11 @@ def test_an_observer_beside_the_device_is_the_one_in_it():
     assert math.isfinite(inside["haptic_device.F_hand_observed"].max())
 
 
-BAR = """
-title = "A bar on a universal joint, in the hand"
-duration = 0.25
-graphics.rate = 32
-
-[linkage]
-operational_point = { body = "bar", at = [0.0, 0.0, 0.1] }
-
-[[linkage.body]]
-name = "bar"
-mass = 0.3
-inertia = 1e-3
-center = [0.0, 0.0, 0.05]
-
-[[linkage.joint]]
-name = "joint"
-type = "universal"
-child = "bar"
-at_parent = [0.0, 0.0, -0.1]
-axis = [1.0, 0.0, 0.0]
-second_axis = [0.0, 1.0, 0.0]
-
-[controller]
-bias = "full"
-
-[controller.teleoperation]
-stiffness = [200.0, 200.0, 200.0]
-damping = [20.0, 20.0, 20.0]
-
-[hand]
-type = "constant"
-wrench = [0.2, -0.1, 0.3]
-
-[device]
-extends = "%s"
-"""
-
-
 @pytest.mark.parametrize("name", ["ideal-3", "falcon", "phantom-premium"])
 def test_a_bar_is_felt_alike_through_every_device(name, tmp_path):
     """The handle follows the bar's end, whatever the device: within a hundredth of its way."""
     path = tmp_path / "bar.toml"
-    path.write_text(BAR % name)
+    path.write_text(BAR_IN_HAND % name)
     found = hl.run(path)
     way = np.linalg.norm(np.diff(found["virtual_mechanism.x"], axis=0), axis=1).sum()
     assert found.run["end"]["reason"] == "duration"
@@ -134,7 +97,7 @@ def test_the_distance_grows_with_the_period_of_the_frames():
 
 def test_an_exported_loop_has_the_bits_and_the_lengths_of_its_scene(tmp_path):
     path = tmp_path / "bar.toml"
-    path.write_text(BAR % "ideal-3")
+    path.write_text(BAR_IN_HAND % "ideal-3")
     ours, theirs = hl.run(path), hl.run(hl.export(path, out=tmp_path / "bar.ssp"))
     x = "haptic_device.x_true"
     np.testing.assert_array_equal(ours[x], theirs[x])

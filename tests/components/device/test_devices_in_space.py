@@ -12,6 +12,7 @@ from hapticlink.components.device.workspace import extents_along, margin
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.scene import read_and_check
 from tests.devices import device
+from tests.spatial_linkages import BAR_IN_HAND
 
 ARM, SHIN, C, D, E, F, R, S = 0.060, 0.1025, 0.01443, 0.01125, 0.01125, -0.025, 0.0400, -0.02309
 """Of the Novint Falcon by libnifalcon, in the names of Stamper's thesis."""
@@ -145,34 +146,11 @@ def test_no_pose_is_called_inside_that_the_closed_form_has_outside(
     assert (inside & ~found).sum() <= missed * inside.sum()
 
 
-BAR = """
-[linkage]
-operational_point = { body = "bar", at = [0.0, 0.0, 0.6] }
-[[linkage.body]]
-name = "bar"
-mass = 0.3
-inertia = 1e-3
-[[linkage.joint]]
-name = "joint"
-type = "universal"
-child = "bar"
-at_parent = [0.0, 0.0, -0.1]
-axis = [1.0, 0.0, 0.0]
-second_axis = [0.0, 1.0, 0.0]
-[controller.teleoperation]
-stiffness = [200.0, 200.0, 200.0]
-damping = [20.0, 20.0, 20.0]
-[hand]
-type = "constant"
-wrench = [0.2, -0.1, 0.3]
-"""
-
-
 @pytest.mark.parametrize("name", ["falcon", "phantom-premium"])
 def test_a_start_that_is_not_reached_is_told_with_the_pose_that_was_asked_for(name):
     """A delta's loops are open there, and the handle of a serial arm is elsewhere: neither has a
     distance to a stop."""
-    scene = f'title = "far"\nduration = 0.1\ngraphics.rate = 32\n{BAR}[device]\nextends = "{name}"'
+    scene = BAR_IN_HAND.replace("0.1] }", "0.6] }") % name
     lost = hl.run(open_scene.load(read_and_check.read_scene(scene, [])), figures=False)
     told = "haptic_device: the start pose (x m, y m, z m) = ("
     *_, third = str(lost.fault).partition(told)[2].partition(")")[0].split(", ")
