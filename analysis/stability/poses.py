@@ -186,8 +186,8 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
     side: then the one in which the run rests, if it does, with the scene's own damping if there is
     any. Raises InputFault where the run fails."""
     assert isinstance(read.hand, ConstantHand)
-    single = bool(read.controller and read.controller.topology)
-    own = any(read.hand.damping or ()) and not single
+    topology = bool(read.controller and read.controller.topology)
+    own = any(read.hand.damping or ()) and not topology
     damping = read.hand.damping if own else by_direction(linkage.space, SETTLED_BY, TURNING)
     free = {"hand": {"type": "constant", "wrench": read.hand.wrench, "damping": damping}}
     told = f"its run{'' if own else f' with {SETTLED_BY:g} N.s/m of damping'}"
@@ -195,7 +195,7 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
     if run.record.fault:
         raise InputFault(f"{told} fails: {run.record.fault.message}")
     speed = float(np.abs(_fastest(run)).max())
-    if speed <= NEARLY and not single:
+    if speed <= NEARLY and not topology:
         with suppress(InputFault, FmuFault):
             pose = _rested(simulate_for(LONGEST, read, free), linkage)
             with resting(read, free, at=pose.start) as place:
