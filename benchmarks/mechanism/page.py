@@ -152,13 +152,16 @@ def _finding(found: dict) -> str:
 def figure_error(folder: Path, found: dict) -> None:
     from matplotlib.lines import Line2D
 
-    figure, panels = draw.panels(len(found), width=5.2, height=4.8)
-    for axes, (case, rows) in zip(panels, found.items(), strict=True):
+    columns = math.ceil((len(found) + 1) / 2)
+    figure, panels = draw.panels(columns, rows=2, width=4.8, height=4.2)
+    for axes, (case, rows) in zip(panels, found.items(), strict=False):
         _error(axes, case, rows)
-    panels[0].set_ylabel("tip error at the end, m")
+    for axes in panels[::columns]:
+        axes.set_ylabel("tip error at the end, m")
     handles = {code: Line2D([], [], color=colour, lw=2) for code, colour in COLOURS.items()}
-    where: dict[str, Any] = {"ncols": len(handles), "loc": "outside lower center"}
-    figure.legend(handles.values(), handles, **where)
+    for axes in panels[len(found) :]:
+        axes.set_axis_off()
+    panels[-1].legend(handles.values(), handles, loc="center", fontsize=11, frameon=False)
     figure.suptitle(_finding(found).rstrip("."))
     figure.canvas.draw()
     for axes in panels:
@@ -167,32 +170,32 @@ def figure_error(folder: Path, found: dict) -> None:
 
 
 def _error(ax: Any, case: str, rows: list[dict]) -> None:
-    """Every method's line; those on their code's front are named where they join it."""
+    """The methods on their code's front, each named where it joins it."""
     for code, colour in COLOURS.items():
-        methods = sorted({r["method"] for r in rows if r["code"] == code})
-        if code == MACHINE:  # the same errors as C, shifted: one line tells how far
-            methods = [m for m in methods if m == "rk4, projection"]
-        named = front([r for r in rows if r["code"] == code and r["method"] in methods])
-        for method in methods:
-            mine = [r for r in rows if (r["code"], r["method"]) == (code, method)]
-            points = sorted((r["ms_per_s"], r["error"], r["floor"]) for r in mine)
-            kept = [(t, e) for t, e, floor in points if 10 * floor < e < LOST]
-            on_front = method in named
-            if kept:
-                style = {"lw": 1.5, "ms": 4} if on_front else {"lw": 0.8, "ms": 2, "alpha": 0.35}
-                ax.loglog(*zip(*kept, strict=True), "o-", color=colour, **style)
-            if kept and on_front:
-                ax.annotate(
-                    method,
-                    named[method],
-                    (4, 3),
-                    textcoords="offset points",
-                    fontsize=7,
-                    color=colour,
-                    bbox={"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7},
-                )
-            diverged = [t for t, e, _ in points if e >= LOST]
-            ax.plot(diverged, [LOST] * len(diverged), "x", color=colour, ms=5)
+        # The VM has the same errors as C, shifted: one line tells how far.
+        mine = [
+            r
+            for r in rows
+            if r["code"] == code and (code != MACHINE or r["method"] == "rk4, projection")
+        ]
+        for method, start in front(mine).items():
+            points = sorted(
+                (r["ms_per_s"], r["error"])
+                for r in mine
+                if r["method"] == method and 10 * r["floor"] < r["error"] < LOST
+            )
+            ax.loglog(*zip(*points, strict=True), "o-", color=colour, lw=1.5, ms=4)
+            ax.annotate(
+                method,
+                start,
+                (4, 3),
+                textcoords="offset points",
+                fontsize=7,
+                color=colour,
+                bbox={"boxstyle": "round,pad=0.1", "fc": "w", "ec": "none", "alpha": 0.7},
+            )
+        diverged = [r["ms_per_s"] for r in mine if r["error"] >= LOST]
+        ax.plot(diverged, [LOST] * len(diverged), "x", color=colour, ms=5)
     ax.set_title(case, fontsize=10)
     ax.set_xlabel("run time per simulated second, ms (x: diverged)")
 
