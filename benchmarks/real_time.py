@@ -46,6 +46,9 @@ class EmptyLoop:
         self._events.patience(NEVER)
         self._thread = Thread(target=self._events.run, args=(lambda tick: None,))
 
+    def publish(self) -> None:
+        """It has no operations to publish."""
+
     def code(self, at: object, run: Callable[..., int], *arguments: int) -> int:
         """What a function of the loop returns."""
         return run(*arguments)
@@ -58,6 +61,7 @@ class EmptyLoop:
     def report(self) -> Report:
         """What became of it, once it has ended."""
         self._thread.join()
+        assert self.pace.c.ticks, "the empty loop did not run"
         return self.pace.report()
 
 
