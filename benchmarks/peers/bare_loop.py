@@ -70,5 +70,7 @@ def seconds(scene: str, options: list[str], steps: int, folder: Path) -> float:
         values = ctypes.c_void_p(simulation.signals.values.ctypes.data)
         fastest = ctypes.c_double(max(rates.values()))
         begin = thread_time()
-        run(len(made), made, values, fastest, ctypes.c_long(steps))
-        return thread_time() - begin
+        status = run(len(made), made, values, fastest, ctypes.c_long(steps))
+        taken = thread_time() - begin
+        assert status == 0, f"{scene}: a step has returned {status}"
+        return taken

@@ -40,6 +40,21 @@ def timed(run: Callable[[int], object]) -> Steps:
     return seconds
 
 
+def went_on(run: Callable[[int, int], object]) -> Steps:
+    """The processor time that `run` takes, which is given the number of steps before it, too: an
+    FMU refuses a step that begins elsewhere than where it stands. `run` returns what is not 0 where
+    a step was refused."""
+    first = 0
+
+    def further(steps: int) -> None:
+        nonlocal first
+        if run(first, steps):
+            raise RuntimeError(f"a step of {first} to {first + steps} was refused")
+        first += steps
+
+    return timed(further)
+
+
 def ours(ring: Ring) -> Steps:
     """Our loop, which records: each call is a run of its own."""
     from benchmarks import rings  # only what a master needs is loaded
@@ -114,16 +129,16 @@ def fmpy(ring: Ring) -> Steps:
     """A loop in Python over FMPy's calls."""
     slaves, inputs, outputs = _slaves(ring)
 
-    def run(steps: int) -> None:
+    def run(first: int, steps: int) -> None:
         y = [slave.getReal(outputs) for slave in slaves]
-        for k in range(steps):
+        for k in range(first, first + steps):
             for i, values in enumerate(y):
                 slaves[(i + 1) % ring.n].setReal(inputs, values)
             for slave in slaves:
                 slave.doStep(k * STEP, STEP)
             y = [slave.getReal(outputs) for slave in slaves]
 
-    return timed(run)
+    return went_on(run)
 
 
 def _functions(slaves: list[Any]) -> list[tuple[Any, ...]]:
@@ -134,7 +149,7 @@ def _functions(slaves: list[Any]) -> list[tuple[Any, ...]]:
 
 def calls_by_ctypes(ring: Ring) -> Steps:
     """A loop in Python over the FMUs' functions, without FMPy's lists and checks: all arguments
-    that do not change are made before."""
+    that do not change are made before, and only the last status is looked at."""
     slaves, inputs, outputs = _slaves(ring)
     n = ctypes.c_size_t(len(inputs))
     u, y = ((ctypes.c_uint * len(found))(*found) for found in (inputs, outputs))
@@ -145,17 +160,18 @@ def calls_by_ctypes(ring: Ring) -> Steps:
     ]
     size = ctypes.c_double(STEP)
 
-    def run(steps: int) -> None:
-        for k in range(steps):
+    def run(first: int, steps: int) -> int:
+        for k in range(first, first + steps):
             time = ctypes.c_double(k * STEP)
             for set_real, _, _, fmu, before, _ in calls:
                 set_real(fmu, u, n, before)
             for _, do_step, _, fmu, _, _ in calls:
-                do_step(fmu, time, size, 1)
+                status = do_step(fmu, time, size, 1)
             for _, _, get_real, fmu, _, own in calls:
                 get_real(fmu, y, n, own)
+        return int(status)
 
-    return timed(run)
+    return went_on(run)
 
 
 def bare(ring: Ring) -> Steps:
@@ -173,7 +189,7 @@ def bare(ring: Ring) -> Steps:
     y = np.zeros(ring.n * signals)
     run, size = bare_loop(ring.folder.parent).ring, ctypes.c_double(STEP)
     arguments = (*references, ctypes.c_size_t(signals), np.ctypeslib.as_ctypes(y))
-    return timed(lambda steps: run(ring.n, of, *arguments, ctypes.c_long(steps), size))
+    return went_on(lambda *k: run(ring.n, of, *arguments, *map(ctypes.c_long, k), size))
 
 
 MASTERS: dict[str, Callable[[Ring], Steps]] = {

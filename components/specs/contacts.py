@@ -67,10 +67,12 @@ class Contacts:
     """Whether pairs that can never touch are left out."""
 
 
+@dataclass(frozen=True, kw_only=True)
 class ContactsOfAllPairs(Contacts):
     """Contacts with the pairs that can never touch, too."""
 
-    broad_phase = False
+    broad_phase: bool = False
+    """A field, so that settings that differ in it alone have FMUs of their own."""
 
 
 @dataclass(frozen=True)

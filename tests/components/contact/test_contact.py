@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pydantic_core import to_jsonable_python
 from scipy.optimize import minimize_scalar
 
 from hapticlink.components.contact.broad_phase import near, out_of_reach, reach
 from hapticlink.components.dynamics.equivalent_wrench import equivalent_wrench
 from hapticlink.components.port_space import PLANE
-from hapticlink.components.specs.contacts import Contacts, Disc, Polygon
+from hapticlink.components.specs.contacts import Contacts, ContactsOfAllPairs, Disc, Polygon
 from hapticlink.components.specs.linkage import Body, Directions, GraphicsCopy
 from studies.report import appendix_a
 from studies.report.appendix_a import L
@@ -242,3 +243,9 @@ def test_contacts_on_a_locked_hand_are_not_felt():
     assert not np.array(f(NOISE, (1e-16, -1e-16, 3e-16))).any()
     moving = np.array(f(np.diag([0.5, 0, 0]) + NOISE, (1.0, 1e-16, 0.0))).ravel()
     np.testing.assert_allclose(moving, [2.0, 0, 0], atol=1e-12)
+
+
+def test_blocks_with_all_pairs_are_fmus_of_their_own():
+    """The settings are what the cache of FMUs tells them apart by."""
+    few = Contacts(stiffness=2e4)
+    assert to_jsonable_python(few) != to_jsonable_python(ContactsOfAllPairs(**vars(few)))
