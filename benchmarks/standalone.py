@@ -49,14 +49,17 @@ console.log(timed(given, now, ROUNDS));
 IN_CHROMIUM = """async ([worker, data, program, duration, rounds]) => {
   const source = new Blob([worker], { type: "text/javascript" });
   const started = new Worker(URL.createObjectURL(source));
-  const answer = new Promise((resolve) => { started.onmessage = ({ data }) => resolve(data); });
+  const answer = new Promise((resolve, reject) => {
+    started.onmessage = ({ data }) => resolve(data);
+    started.onerror = ({ message }) => reject(new Error(message));
+  });
   const { buffer } = Uint8Array.from(atob(program), (c) => c.charCodeAt(0));
   started.postMessage([{ data, program: buffer, duration }, rounds]);
   return answer;
 }"""
 IN_WORKER = """
-const now = () => performance.now() / 1e3;
-onmessage = ({ data: [given, rounds] }) => postMessage(timed(given, now, rounds));
+onmessage = ({ data: [given, rounds] }) =>
+  postMessage(timed(given, () => performance.now() / 1e3, rounds));
 """
 
 
