@@ -29,6 +29,18 @@ def test_two_checkouts_take_turns_and_are_compared_beside_a_neighbour() -> None:
     assert counts == ""
 
 
+def test_of_an_earlier_checkout_what_it_does_not_know_is_left_out(tmp_path: Path) -> None:
+    without = tmp_path / Path(sys.executable).name
+    without.write_text("#!/bin/sh\nexit 2\n")
+    without.chmod(0o755)
+    earlier = str(tmp_path / "hapticlink")
+    before, after, beside, counts = waiting._measured(["-c", "pass"], [earlier, COMMAND], 1)
+    assert (before, beside, counts) == ("", "", "")
+    assert after > 0.0
+    with pytest.raises(RuntimeError):
+        waiting._measured(["-c", "pass"], [COMMAND, earlier], 1)
+
+
 def test_a_command_that_fails_is_no_measurement(tmp_path: Path) -> None:
     with pytest.raises(RuntimeError, match="no such thing"):
         waiting._take(COMMAND, ["-c", "import sys; print('no such thing'); sys.exit(3)"], tmp_path)
