@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2995,
     "orchestrator": 16912,
     "programs": 1047,
-    "analysis": 9121,
+    "analysis": 9120,
     "visualization": 3854,
     "api": 637,
     "commands": 1639,

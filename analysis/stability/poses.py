@@ -194,11 +194,11 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
     run = simulate_for(SETTLING, read, free)
     if run.record.fault:
         raise InputFault(f"{told} fails: {run.record.fault.message}")
-    same, speed = SharedWork().keys, float(np.abs(_fastest(run)).max())
+    speed = float(np.abs(_fastest(run)).max())
     if speed <= NEARLY and not topology:
         with suppress(InputFault, FmuFault):
             pose = _rested(simulate_for(LONGEST, read, free), linkage)
-            with resting(read, free, at=pose.start, work=SharedWork(keys=same)) as place:
+            with resting(read, free, at=pose.start) as place:
                 all_modes = modes(place.period({}).linear, place.map.period)
                 if judged_modes(all_modes)[0].growth < 0.0:  # else the run creeps past it
                     pose = pose.at_equilibrium(place, linkage)
@@ -209,8 +209,7 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
     tried: list[tuple[Pose, Options, str]] = [(p, free, "under that wrench") for p in near]
     tried += [(p, p.held, "in which a firm grip holds it") for p in near]
     for pose, hand, how in tried:
-        work = SharedWork(keys=same)
-        with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start, work=work) as place:
+        with suppress(InputFault, FmuFault), resting(read, hand, at=pose.start) as place:
             found = f"{moves}, and judged is the equilibrium next to there {how}"
             return replace(pose.at_equilibrium(place, linkage), found=found)
     return near[0]
