@@ -161,9 +161,10 @@ class StateBlock:
     def _views(self, counts: tuple[int, ...]) -> _Views:
         """Of the arrays while the counters have these values, which they have now."""
         if counts not in self._known:
-            kinds = [[a for a in self._arrays if a.is_whole == whole] for whole in (True, False)]
-            lengths = tuple(array.length for array in kinds[1])
-            self._known[counts] = _Views(*map(_views, kinds), counts, lengths)
+            whole = _views(array for array in self._arrays if array.is_whole)
+            others = [array for array in self._arrays if not array.is_whole]
+            lengths = tuple(array.length for array in others)
+            self._known[counts] = _Views(whole, _views(others), counts, lengths)
         return self._known[counts]
 
 
