@@ -245,16 +245,8 @@ class ForwardSensitivity:
         J[:after, :before] = arrived
         J[after:, :before] = by[:, :after] @ arrived
         J[after:, before:] = by[:, after:]
-        return Applied(
-            operation,
-            (name, powers),
-            (before, 0),
-            (after, further),
-            reads,
-            held,
-            J,
-            np.zeros_like(J),
-        )
+        owners, E = (name, powers), np.zeros_like(J)
+        return Applied(operation, owners, (before, 0), (after, further), reads, held, J, E)
 
     def _arrived(
         self, tick: int, operation: Evaluate, call: Call, reach: Reach, since: Since
@@ -279,10 +271,8 @@ class ForwardSensitivity:
     def _powers(self, tick: int, operation: Evaluate, since: Since, size: int) -> Matrix:
         """The slopes of c_0 to c_d by the `size` numbers of the state of a hold, and by what it
         reads beside its samples."""
-        hold, block = (
-            self._simulation.holds[operation.connection],
-            self._blocks[operation.connection],
-        )
+        name = operation.connection
+        hold, block = self._simulation.holds[name], self._blocks[name]
         board, parts, reads = self._simulation.signals.values, hold.parts, read_by(hold)
         beside = b""
         if parts.beside:
@@ -294,7 +284,7 @@ class ForwardSensitivity:
         known = self.work.slopes.setdefault((POWERS, *about, since), [])
         if known and not parts.beside:
             return known[0].J
-        at = np.concatenate([block.save().numbers, board[reads]])
+        at = np.concatenate([block.numbers(), board[reads]])
         wide = SAME * np.maximum(1.0, np.abs(at))
         for slopes in known:
             if (np.abs(at - slopes.at) <= wide).all():

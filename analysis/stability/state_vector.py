@@ -121,7 +121,7 @@ class StateVector:
             doubles(instances[name].serialized())[taken] for name, taken in self._taken.items()
         ]
         parts.append(self._simulation.signals.values)
-        parts += (block.save().numbers for block in self._holds.values())
+        parts += (block.numbers() for block in self._holds.values())
         return np.concatenate(parts)
 
     def integers(self) -> NDArray[np.int64]:

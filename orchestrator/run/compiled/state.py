@@ -6,10 +6,9 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -77,14 +76,12 @@ class Array:
 
 @dataclass(frozen=True)
 class _Views:
-    """The arrays of a state while they have these lengths."""
+    """The arrays of a state while they have these counts, and its numbers these lengths."""
 
     integers: list[Integers]
     numbers: list[Vector]
-
-    @cached_property
-    def lengths(self) -> tuple[int, ...]:
-        return tuple(map(len, self.numbers))
+    counts: tuple[int, ...]
+    lengths: tuple[int, ...]
 
 
 class StateBlock:
@@ -100,17 +97,17 @@ class StateBlock:
 
     def integers(self) -> Integers:
         """The whole numbers of the state as it is."""
-        if self._own():
-            return self.save().integers
-        self._locate()
-        return _joined(self._views(self._counts()).integers, np.int64)
+        return self.save().integers if self._own() else _joined(self._now().integers, np.int64)
+
+    def numbers(self) -> Vector:
+        """Its other numbers."""
+        return self.save().numbers if self._own() else _joined(self._now().numbers, float)
 
     def save(self) -> Saved:
-        self._locate()
-        views = self._views(counts := self._counts())
+        views = self._now()
         integers, numbers = _joined(views.integers, np.int64), _joined(views.numbers, float)
         if not (own := self._own()):
-            return Saved(integers, numbers, counts, views.lengths, {})
+            return Saved(integers, numbers, views.counts, views.lengths, {})
         floats, whole = [numbers], [*integers.tolist()]
 
         def note(value: Vector) -> Vector:
@@ -120,7 +117,7 @@ class StateBlock:
         attributes = _copied(vars(own), note, whole.append)
         every = np.concatenate(floats)
         lengths = (*views.lengths, len(every) - len(numbers))
-        return Saved(np.array(whole, np.int64), every, counts, lengths, attributes)
+        return Saved(np.array(whole, np.int64), every, views.counts, lengths, attributes)
 
     def restore(self, saved: Saved, numbers: Vector) -> None:
         """Takes on a state that was saved, with these numbers in the place of its own."""
@@ -156,15 +153,18 @@ class StateBlock:
             self._counters = [each for array in self._arrays for each in array.counters]
             self._known = {}
 
-    def _counts(self) -> tuple[int, ...]:
-        return tuple([int(counter[0]) for counter in self._counters])
+    def _now(self) -> _Views:
+        """Of the arrays as they are."""
+        self._locate()
+        return self._views(tuple([int(counter[0]) for counter in self._counters]))
 
     def _views(self, counts: tuple[int, ...]) -> _Views:
         """Of the arrays while the counters have these values, which they have now."""
         if counts not in self._known:
-            views = [(array.is_whole, array.view) for array in self._arrays]
-            of_kind = ([view for whole, view in views if whole == kind] for kind in (True, False))
-            self._known[counts] = _Views(*of_kind)
+            whole = _views(array for array in self._arrays if array.is_whole)
+            others = [array for array in self._arrays if not array.is_whole]
+            lengths = tuple(array.length for array in others)
+            self._known[counts] = _Views(whole, _views(others), counts, lengths)
         return self._known[counts]
 
 
@@ -198,6 +198,18 @@ def _arrays(c: Any, path: str, owners: tuple[Any, ...]) -> Iterator[Array]:
             yield Array(name, address, pointer.type == "int64_t", n)
         else:
             yield Array(name, address, pointer.type == "int64_t", 0, pointer.used, known)
+
+
+def _views(arrays: Iterable[Array]) -> list[NDArray[Any]]:
+    """The entries of arrays of one kind, in their order; of neighbours in memory as one, since a
+    view costs more than its entries."""
+    runs: list[Array] = []
+    for array in arrays:
+        if runs and runs[-1].address + WORD * runs[-1].n == array.address:
+            runs[-1] = replace(runs[-1], n=runs[-1].n + array.length)
+        else:
+            runs.append(replace(array, n=array.length, used=None))
+    return [run.view for run in runs if run.n]
 
 
 def _joined(views: Sequence[NDArray[Any]], kind: type) -> NDArray[Any]:
