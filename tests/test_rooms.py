@@ -30,7 +30,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 """Folders of the checkout that the package does not import."""
 
 CODE_LINES = {
-    "components": 7508,
+    "components": 7509,
     "fmus": 2995,
     "orchestrator": 16913,
     "programs": 1047,
