@@ -23,7 +23,7 @@ KeyedEvents = tuple[Ticks, dict[Event, NDArray[np.intp]]]
 def as_array(starts: Sequence[int]) -> Ticks:
     """Communication points; those of a range are not read one by one."""
     if isinstance(starts, range):
-        return np.arange(starts.start, starts.stop, starts.step, np.int64)
+        return np.arange(starts.start, starts.stop, starts.step, dtype=np.int64)
     return np.array(starts, np.int64)
 
 
