@@ -13,11 +13,12 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import overload
 
 
+@lru_cache(1024, typed=True)
 def exact(number: int | float | str) -> Fraction:
     """The rational number that is written: 2997/100 for 29.97, 30000/1001 for "30000/1001".
 

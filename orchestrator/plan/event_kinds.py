@@ -7,6 +7,7 @@ An event's key: whether it is the first, then for each clock twice the step (tic
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,12 +20,19 @@ KeyedEvents = tuple[Ticks, dict[Event, NDArray[np.intp]]]
 """Ticks of events, and the indices of those of each kind."""
 
 
+def as_array(starts: Sequence[int]) -> Ticks:
+    """Communication points; those of a range are not read one by one."""
+    if isinstance(starts, range):
+        return np.arange(starts.start, starts.stop, starts.step, dtype=np.int64)
+    return np.array(starts, np.int64)
+
+
 def keyed_events(timeline: Timeline, until: int, most: int) -> KeyedEvents:
     """The ticks of the events up to `until`, `most` of them, and the indices of those of each kind,
     which are in the order of their first occurrence."""
     every = [clock.starts for clock in timeline.clocks]
     until = min(until, *(starts[most] for starts in every if len(starts) > most), timeline.end)
-    begun = [np.array(starts[: bisect_right(starts, until) + 1], np.int64) for starts in every]
+    begun = [as_array(starts[: bisect_right(starts, until) + 1]) for starts in every]
     # With an index, since NumPy loads its masked arrays otherwise.
     ticks, _ = np.unique(np.concatenate([starts[:-1] for starts in begun]), return_index=True)
     ticks = ticks[ticks <= until]
@@ -34,11 +42,11 @@ def keyed_events(timeline: Timeline, until: int, most: int) -> KeyedEvents:
         start = starts[:-1][starts[:-1] <= until]
         after = starts[1 : len(start) + 1]
         keys[np.searchsorted(ticks, start), 1 + i] = 2 * (after - start) + (after > timeline.end)
-    whole = keys[:most].view(np.dtype((np.void, keys.strides[0]))).ravel()
-    _, first, kind = np.unique(whole, return_index=True, return_inverse=True)
-    rows = np.split(np.argsort(kind, kind="stable"), np.bincount(kind).cumsum()[:-1])
-    order = np.argsort(first)
-    return ticks[:most], {event(timeline, whole[first[k]].tobytes()): rows[k] for k in order}
+    keys = keys[:most]
+    order = np.lexsort(keys.T)
+    kinds = np.split(order, np.flatnonzero(np.diff(keys[order], axis=0).any(axis=1)) + 1)
+    kinds.sort(key=lambda rows: int(rows[0]))
+    return ticks[:most], {event(timeline, keys[rows[0]].tobytes()): rows for rows in kinds}
 
 
 def key_of(timeline: Timeline, kind: Event) -> list[int]:

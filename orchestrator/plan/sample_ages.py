@@ -100,9 +100,11 @@ def delays(plan: Plan, events: int = MAX_EVENTS) -> dict[str, Delay]:
     end before it.
     """
     system, seconds = plan.system, plan.system.timeline.seconds
-    until, first = pattern_end(system), plan.first_events
-    are_all = until == system.timeline.end and len(first[0]) <= min(events, FIRST - 1)
-    ticks, kinds = first if are_all else keyed_events(system.timeline, until, events)
+    until, (ticks, kinds) = pattern_end(system), plan.first_events
+    if (n := min(events, int(np.searchsorted(ticks, until, "right")))) < FIRST:
+        ticks, kinds = ticks[:n], {k: rows[rows < n] for k, rows in kinds.items() if rows[0] < n}
+    else:
+        ticks, kinds = keyed_events(system.timeline, until, events)
     last = int(ticks[-1]) if len(ticks) else 0
     begun = begun if (begun := _pattern_begin(system)) < last else 0
     late = {c.name for c in system.connections if c.latency}
@@ -168,11 +170,10 @@ def _ages(
 def pattern_end(system: System) -> int:
     """The last tick of the first hyperperiod that begins after all phases and constant latencies;
     the end of the run if the pattern of events does not repeat."""
-    timeline = system.timeline
-    clocks, late = timeline.clocks, [c.latency for c in system.connections if c.latency]
-    drawn = any(way.loss or way.max not in (None, way.min) for way in late)
-    periods = [c.period for c in clocks if c.period]
-    if drawn or len(periods) < len(clocks):
+    timeline, ways = system.timeline, (c.latency for c in system.connections if c.latency)
+    drawn = any(way.loss or way.max not in (None, way.min) for way in ways)
+    periods = [c.period for c in timeline.clocks if c.period]
+    if drawn or len(periods) < len(timeline.clocks):
         return timeline.end
     return min(timeline.end, _pattern_begin(system) + math.lcm(*periods))
 

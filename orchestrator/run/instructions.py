@@ -100,14 +100,10 @@ def _with_barriers(
     """The instructions, with a barrier after each group of concurrent steps."""
     stepping: list[str] = []
     for instruction in instructions:
-        match instruction:
-            case Instruction(concurrent=True):
-                pass
-            case Set(fmu) | Step(fmu) if fmu in isolated and fmu not in stepping:
-                pass
-            case _ if stepping:
-                yield Finish(tuple(stepping))
-                stepping.clear()
+        own = isinstance(instruction, Set | Step) and instruction.fmu
+        if stepping and not (instruction.concurrent or (own in isolated and own not in stepping)):
+            yield Finish(tuple(stepping))
+            stepping.clear()
         yield instruction
         if isinstance(instruction, Step) and instruction.fmu in isolated:
             stepping.append(instruction.fmu)

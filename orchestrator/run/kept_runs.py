@@ -168,8 +168,3 @@ def keep(run: KeptRun) -> None:
         run.opened.close()
     else:
         _RUNS.put(run)
-
-
-def count_kept() -> int:
-    """The runs that this process keeps."""
-    return len(_RUNS)

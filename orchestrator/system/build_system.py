@@ -191,7 +191,7 @@ def _assemble(
     alone = (replace(u, isolate=u.isolate or scene.isolate) for u in every)
     fmus = tuple(with_sizes(u, time) for u in alone)
     problems += (((), why) for fmu in fmus for why in too_long(fmu))
-    connections = _connections(scene, fmus, problems)
+    connections = _connections(scene, fmus, rows, problems)
     fmus = tuple(read_recorded(u, scene.record, connections) for u in fmus)
     if len(tables) < len(scene.fmu):  # what names an FMU that cannot be read may be right
         raise _faults(scene, problems)
@@ -299,10 +299,10 @@ def _read_again(scene: Scene, ours: Iterable[Fmu]) -> Iterator[str]:
 
 
 def _connections(
-    scene: Scene, fmus: Iterable[Fmu], problems: list[Problem]
+    scene: Scene, fmus: Iterable[Fmu], rows: Iterable[Wire], problems: list[Problem]
 ) -> tuple[Connection, ...]:
-    """The connections of [[connection]], and those of the haptic loop to inputs that no
-    [[connection]] feeds."""
+    """The connections of [[connection]], and those `rows` of the haptic loop that are to inputs
+    that no [[connection]] feeds."""
     described = {u.name: u.description for u in fmus}
     wires: list[tuple[Keys, Wire]] = [
         (("connection", i), wire)
@@ -312,7 +312,7 @@ def _connections(
     asked = tuple(connect(wires, described, problems))
     fed = {f"{c.target}.{s.port}" for _, c in asked for s in c.inputs}
     own = {f.name for f in scene.fmu if not f.replaces}
-    rows = haptic_loop.wires(scene, {n: d for n, d in described.items() if n not in own})
+    rows = haptic_loop.wires(rows, {n: d for n, d in described.items() if n not in own})
     paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
     wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
     loop = _connect_loop(wires, described, problems)

@@ -78,7 +78,7 @@ def rows(scene: Scene) -> tuple[Wire, ...]:
     return tuple(Wire(from_=source, to=target) for source, target in _rows(scene))
 
 
-def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...]:
+def wires(rows: Iterable[Wire], described: Mapping[str, Description]) -> tuple[Wire, ...]:
     """The rows of which both ends are variables of the scene's blocks, `described` by name."""
 
     def has(end: str, *causalities: str) -> bool:
@@ -86,7 +86,7 @@ def wires(scene: Scene, described: Mapping[str, Description]) -> tuple[Wire, ...
         return block in described and bool(described[block].port(port, *causalities))
 
     return tuple(
-        row for row in rows(scene) if has(row.from_, "output") and has(row.to, "input", "parameter")
+        row for row in rows if has(row.from_, "output") and has(row.to, "input", "parameter")
     )
 
 

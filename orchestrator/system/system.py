@@ -106,7 +106,7 @@ class Connection:
     def to(self) -> str:
         return f"{self.target}.{self.target_port}"
 
-    @property
+    @cached_property
     def name(self) -> str:
         return f"{self.from_} -> {self.to}"
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan.event_kinds import event, key_of
+from hapticlink.orchestrator.plan.event_kinds import as_array, event, key_of
 from hapticlink.orchestrator.plan.operations import Event
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.plan.sample_ages import Delay, delays
@@ -179,7 +179,7 @@ class Events:
     def _next_window(self, i: int) -> None:
         """The next communication points of clock i: the current one comes first."""
         self._given[i] = first = self._given[i] + self._clocks[i].at
-        window = np.array(self._starts[i][first : first + WINDOW], np.int64)
+        window = as_array(self._starts[i][first : first + WINDOW])
         if len(window) < 2:
             window = np.array([NEVER, NEVER], np.int64)
         self._clocks[i].fill(starts=window, n=len(window), at=0)

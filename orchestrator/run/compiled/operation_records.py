@@ -98,9 +98,9 @@ class Machine:
         first = len(self._instructions)
         self._instructions += sequence
         for instruction in sequence:  # kinds of events share most of theirs
-            if instruction not in self._records:
-                self._records[instruction] = self._record(instruction)
-            self._ops.append(self._records[instruction])
+            if (record := self._records.get(instruction)) is None:
+                record = self._records[instruction] = self._record(instruction)
+            self._ops.append(record)
         return first, len(self._instructions)
 
     def publish(self) -> None:

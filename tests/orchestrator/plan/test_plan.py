@@ -9,8 +9,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hapticlink.orchestrator.base.ticks import Timeline
-from hapticlink.orchestrator.plan.operations import Get, Push, Record, Set, Step
-from hapticlink.orchestrator.plan.plan import Plan
+from hapticlink.orchestrator.plan.event_kinds import keyed_events
+from hapticlink.orchestrator.plan.operations import Event, Get, Push, Record, Set, Step
+from hapticlink.orchestrator.plan.plan import Plan, moments
 from hapticlink.orchestrator.plan.sample_ages import MAX_EVENTS, Delay, delays, pattern_end, uses
 from hapticlink.orchestrator.plan.schemes import SCHEMES
 from hapticlink.orchestrator.system.system import System
@@ -103,6 +104,18 @@ def test_nothing_reads_the_future_and_holds_give_the_newest(stamped, timeline, c
         until = max(tick - 1, 0) if coupling == "jacobi" and source.sampled else tick
         starts = timeline.clock(source.clock).starts
         assert stamp == starts[bisect_right(starts, until) - 1]
+
+
+@given(timelines, st.sampled_from([MAX_EVENTS, 40]))
+def test_kinds_of_events_are_those_of_each_event(timeline, most):
+    """In the order of their first occurrence, each with its events in order."""
+    rows: dict[Event, list[int]] = {}
+    every = [*islice(moments(timeline), most)]
+    for i, (_, event) in enumerate(every):
+        rows.setdefault(event, []).append(i)
+    ticks, kinds = keyed_events(timeline, timeline.end, most)
+    assert [*ticks] == [tick for tick, _ in every]
+    assert [(kind, [*of]) for kind, of in kinds.items()] == [*rows.items()]
 
 
 @shared
