@@ -32,7 +32,7 @@ OUTSIDE = ("studies", "benchmarks", "fuzz", "tests", "docs")
 CODE_LINES = {
     "components": 7508,
     "fmus": 2995,
-    "orchestrator": 16906,
+    "orchestrator": 16905,
     "programs": 1047,
     "analysis": 9130,
     "visualization": 3854,
