@@ -190,9 +190,10 @@ def _prepare_once(scene: Scene, every: System) -> Prepared:
     if ready is None:
         ready = _prepare(scene, every, None, NOWHERE)
     else:
-        system = ready.system.restarted((f.starts for f in every.fmus), lambda _: every.energy)
+        starts = (fmu.starts for fmu in every.fmus)
+        system = ready.system.restarted(starts, lambda _: every.energy, every.timeline)
         before = replace(ready.before, **describe_scene(scene))
-        ready = replace(ready, every=every, plan=ready.plan.of(system), before=before)
+        ready = replace(ready, every=every, plan=replace(ready.plan, system=system), before=before)
     _PREPARED.put(ready)
     return ready
 
@@ -376,15 +377,14 @@ def simulate_together(
     compiles: whether to compile the steps of several instances that the cache lacks. Raises
     Interrupted.
     """
-    begin, alike = perf_counter(), False  # whether scenes have differed in start values alone
+    begin = perf_counter()
     ready: list[tuple[int, Prepared]] = []
     kept: list[Kept | None] = [None] * len(scenes)
     with ExitStack() as stack:
         for i, scene in enumerate(scenes):
             with suppress(InputFault):
-                every = build_again(scene) if alike else None
-                alike = every is not None or i == 0
-                every = every or stack.enter_context(build_system(scene))
+                again = build_again(scene) if i else None
+                every = again or stack.enter_context(build_system(scene))
                 made = _prepare_once(scene, every)
                 if not (scene.fmu or scene.resume) and _fits_in_memory(made.system, made.tables):
                     ready.append((i, made))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -135,12 +135,12 @@ def components(feeds: Mapping[Node, Collection[Node]]) -> list[list[Node]]:
     lowest: dict[Node, int] = {}
     path: list[Node] = []
 
-    def visit(node: Node) -> None:
+    def visit(node: Node, again: Callable[..., None]) -> None:
         number[node] = lowest[node] = len(number)
         path.append(node)
         for before in (n for n in feeds[node] if n in feeds):
             if before not in number:
-                visit(before)
+                again(before, again)
                 lowest[node] = min(lowest[node], lowest[before])
             elif before in path:
                 lowest[node] = min(lowest[node], number[before])
@@ -151,7 +151,7 @@ def components(feeds: Mapping[Node, Collection[Node]]) -> list[list[Node]]:
 
     for node in feeds:
         if node not in number:
-            visit(node)
+            visit(node, visit)  # one that refers to itself would stay until cycles are searched
     return groups
 
 

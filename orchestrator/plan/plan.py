@@ -67,10 +67,6 @@ class Plan:
         """The first events of a run, FIRST at most."""
         return keyed_events(self.system.timeline, self.system.timeline.end, FIRST)
 
-    def of(self, system: System) -> Plan:
-        """The same plan of a system that differs in start values alone."""
-        return Plan(system, self._blocks)
-
     def check(self) -> None:
         """Raises InputFault if the scheme cannot order the FMUs, or leaves out the step of one or
         the rows of a clock, and for times that are not exact. The first event suffices, since all

@@ -8,7 +8,7 @@ from collections import defaultdict
 from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,22 +146,24 @@ def _ages(
     rows_of = [*kinds.values()]
     counted = [rows[ticks[rows] > begun] for rows in rows_of]
 
-    @cache
-    def before(places: Left) -> NDArray[np.int64]:
-        after, newest = np.zeros(len(ticks) + 1, np.int64), np.zeros(len(ticks) + 1, np.intp)
-        for number, stamp in places:
-            rows = rows_of[number]
-            after[rows + 1] = of(stamp if isinstance(stamp, int) else left[stamp], rows)
-            newest[rows + 1] = rows + 1
-        stamps: NDArray[np.int64] = after[np.maximum.accumulate(newest)]
-        return stamps
+    known: dict[Left, NDArray[np.int64]] = {}
 
-    def of(stamp: int | Left, rows: NDArray[np.intp]) -> NDArray[np.int64]:
-        return ticks[rows] + stamp if isinstance(stamp, int) else before(stamp)[rows]
+    def of(stamp: int | Left, rows: NDArray[np.intp], again: Any) -> NDArray[np.int64]:
+        # `again` is this function: one that refers to itself stays until cycles are searched.
+        if isinstance(stamp, int):
+            return ticks[rows] + stamp
+        if stamp not in known:
+            after, newest = np.zeros(len(ticks) + 1, np.int64), np.zeros(len(ticks) + 1, np.intp)
+            for number, own in stamp:
+                here = rows_of[number]
+                after[here + 1] = again(own if isinstance(own, int) else left[own], here, again)
+                newest[here + 1] = here + 1
+            known[stamp] = after[np.maximum.accumulate(newest)]
+        return known[stamp][rows]
 
     @cache
     def ages(*each: tuple[int, int | Left]) -> NDArray[np.int64]:
-        return np.concatenate([ticks[counted[i]] - of(stamp, counted[i]) for i, stamp in each])
+        return np.concatenate([ticks[counted[i]] - of(stamp, counted[i], of) for i, stamp in each])
 
     for name, each in used.items():
         yield name, ages(*((i, s if isinstance(s, int) else left[s]) for i, s in each))

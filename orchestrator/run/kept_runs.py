@@ -128,7 +128,6 @@ class KeptRun:
     def begin_again(self, plan: Plan, results: RunResults, stack: ExitStack) -> KeptRun:
         """This run, before the first event of one of the system of `plan`. Raises as a start
         does."""
-        again = self
         self.memory.put_back()
         self.loop.complete = 0
         same_time = plan.system.timeline == self.simulation.system.timeline
@@ -136,10 +135,9 @@ class KeptRun:
         self.simulation.start()
         if same_time:
             self.loop.begin_again()
-        else:
-            self.loop.take_plan(plan)
-            again = replace(self, plan=plan)
-        return again
+            return self
+        self.loop.take_plan(plan)
+        return replace(self, plan=plan)
 
 
 _RUNS: shelf.Shelf[KeptRun] = shelf.Shelf(MOST, lambda run: run.opened.close())

@@ -4,7 +4,7 @@ that the far sides of springs have put in."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import count
+from functools import cached_property
 
 import numpy as np
 
@@ -72,18 +72,22 @@ class SignalVector:
 
     def texts(self, recorded: Iterable[str] | None) -> dict[int, str]:
         """By the places in a row of those recorded columns that are texts, their FMI types."""
-        types = {
-            f"{u.name}.{s.name}": s.type for u in self.system.fmus for s in u.description.outputs
-        }
-        columns = enumerate(recorded or (), 1)
-        return {place: types[name] for place, name in columns if types.get(name) in WRITTEN}
+        columns, types = enumerate(recorded or (), 1), self._texts
+        return {place: types[name] for place, name in columns if name in types}
+
+    @cached_property
+    def _texts(self) -> dict[str, str]:
+        """The FMI types of outputs that are texts."""
+        every = ((u.name, s) for u in self.system.fmus for s in u.description.outputs)
+        return {f"{name}.{s.name}": s.type for name, s in every if s.type in WRITTEN}
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
 
     def text_values(self) -> Iterator[tuple[str, float]]:
         """The names and numbers of all texts, put out and held."""
-        for u in self.system.fmus:
-            for s, i in zip(u.description.outputs, count(self.fmu(u.name).start)):
-                if s.type in WRITTEN:
-                    yield f"{u.name}.{s.name}", self.values[i]
+        yield from ((name, self.values[self._columns[name]]) for name in self._texts)
         for c in self.system.connections:
             if c.hold and c.outputs[0].type in WRITTEN:
                 yield from ((c.name, number) for number in self.values[self.hold(c.name)])
@@ -93,8 +97,7 @@ class SignalVector:
         recording = self.system.recording
         of = recording.slower.get(table)
         span, written = self.clock(of.clock if of else table), of.outputs if of else recording.whole
-        names = {f"{f}.{v}": i for (f, v), i in self._of_scalar.items()}
-        columns = {n: i for n, i in names.items() if span.start <= i < span.stop}
+        columns = {n: i for n, i in self._columns.items() if span.start <= i < span.stop}
         if written is None:
             return columns
         return {n: columns[n] for n in written if n in columns} or None

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from hapticlink.fmus.blocks import Starts
 from hapticlink.orchestrator.base import plugins, shelf, temporary_folders
@@ -48,7 +48,7 @@ from hapticlink.orchestrator.system.outputs_to_record import (
     read_recorded,
 )
 from hapticlink.orchestrator.system.start_values import separate_start_values
-from hapticlink.orchestrator.system.step_sizes import too_long, with_sizes
+from hapticlink.orchestrator.system.step_sizes import sizes, too_long, with_sizes
 from hapticlink.orchestrator.system.system import (
     Connection,
     Coupling,
@@ -77,42 +77,38 @@ def build_system(scene: Scene, starts: Mapping[str, Starts] | None = None) -> It
             return
         planned = separate_start_values(planned)
         made_of = MadeOf.of(scene, planned)
-        known = made_of and _SYSTEMS.take(lambda item: item.made_of == made_of)
+        known = made_of and _find_known(made_of, scene, planned)
         time = known.system.timeline if known else timeline(scene, planned)
         files = fmu_files(scene, planned, time, room)
         described = [describe_once(files[b.name]) for b in planned.own]
-        if known and known.described != described:
-            known, time = None, timeline(scene, planned)
-        if known:
-            system = _with_starts(scene, planned, known.system)
+        if known and known.described == described:
+            system = _with_starts(scene, planned, known.system, known.system.timeline)
         else:
-            system = _assemble(scene, planned, time, files)
-        if made_of:
-            _SYSTEMS.put(known or Assembled(made_of, described, system))
+            system = _assemble(scene, planned, timeline(scene, planned) if known else time, files)
+            if made_of:
+                _SYSTEMS.put(Assembled(made_of, described, system))
         yield system
 
 
 def build_again(scene: Scene) -> System | None:
-    """The system of a scene that differs in start values alone from one that `build_system` has
-    just made, without a look at the FMU files; None where this process keeps none."""
+    """The system of a scene that differs in start values and rates alone from one that
+    `build_system` has just made, without a look at the FMU files; None where this process keeps
+    none."""
     planned = separate_start_values(blocks(scene))
     made_of = MadeOf.of(scene, planned)
-    known = made_of and _SYSTEMS.take(lambda item: item.made_of == made_of)
-    if not known:
-        return None
-    _SYSTEMS.put(known)
-    return _with_starts(scene, planned, known.system)
+    known = made_of and _find_known(made_of, scene, planned)
+    return _with_starts(scene, planned, known.system, known.system.timeline) if known else None
 
 
 MAX_SYSTEMS = 32
 """Systems that a process keeps; those that differ in start values alone count as one."""
 
 
-@dataclass(frozen=True)
-class MadeOf:
-    """What a system follows from but start values: the scene without these, its events as text, in
-    which 0.0 is not -0.0, nor 1 true, and the common settings of its blocks."""
+class MadeOf(NamedTuple):
+    """What a system follows from but start values: its rates, the scene without these, its events
+    as text, in which 0.0 is not -0.0, nor 1 true, and the common settings of its blocks."""
 
+    rates: tuple[object, object]
     scene: Scene
     events: str
     settings: Sequence[tuple[str, Mapping[str, Any]]]
@@ -122,8 +118,11 @@ class MadeOf:
         """None where this process keeps no system, or FMUs of others may change."""
         if not shelf.is_keeping() or scene.fmu or scene.connection or plugins.list_plugins():
             return None
+        rates = scene.haptics.rate, scene.graphics and scene.graphics.rate
         common = replace(
             scene.plain(),
+            haptics=replace(scene.haptics, rate=1),
+            graphics=scene.graphics and replace(scene.graphics, rate=1),
             title="",
             description="",
             hand=None,
@@ -132,7 +131,7 @@ class MadeOf:
             controllers={},
             linkage=scene.linkage and replace(scene.linkage, start={}),
         )
-        return cls(common, repr(scene.at), [(b.name, b.settings) for b in planned.own])
+        return cls(rates, common, repr(scene.at), [(b.name, b.settings) for b in planned.own])
 
 
 @dataclass(frozen=True)
@@ -148,16 +147,44 @@ class Assembled:
 _SYSTEMS: shelf.Shelf[Assembled] = shelf.Shelf(MAX_SYSTEMS)
 
 
-def _with_starts(scene: Scene, planned: Blocks, system: System) -> System:
-    """A system with the start values that a scene gives its blocks."""
+def _find_known(made_of: MadeOf, scene: Scene, planned: Blocks) -> Assembled | None:
+    """What this process keeps for a scene's system, perhaps as it follows from another's."""
+    known = _SYSTEMS.take(lambda item: item.made_of == made_of)
+    if not known and (other := _SYSTEMS.take(lambda item: item.made_of[1:] == made_of[1:])):
+        _SYSTEMS.put(other)
+        system = _with_starts(scene, planned, other.system, timeline(scene, planned))
+        if _follows_from(scene, system, other.system):
+            known = Assembled(made_of, other.described, system)
+    if known:
+        _SYSTEMS.put(known)
+    return known
+
+
+def _follows_from(scene: Scene, system: System, other: System) -> bool:
+    """Whether `_assemble` makes a system as this one, which has all of another but start values and
+    timeline: where it asks no more of the clocks than which is slower. The FMUs are this project's,
+    which take steps of any size."""
+
+    def order(time: Timeline) -> object:
+        return time.of, [[a.longest > b.longest for b in time.clocks] for a in time.clocks]
+
+    return (
+        order(system.timeline) == order(other.timeline)
+        and not (other.early or scene.at or isinstance(scene.record.signals, Mapping))
+        and not any(any(too_long(fmu)) for fmu in system.fmus)
+    )
+
+
+def _with_starts(scene: Scene, planned: Blocks, system: System, time: Timeline) -> System:
+    """A system with the timeline, and the start values that a scene gives its blocks."""
     by_name = {b.name: b for b in planned.own}
-    starts = (_restarts(fmu, by_name[fmu.name]) for fmu in system.fmus)
+    starts = (_restarts(fmu, by_name[fmu.name], time) for fmu in system.fmus)
     energy = partial(find_energy_ports, scene, connections=system.connections)
-    return system.restarted(starts, energy)
+    return system.restarted(starts, energy, time)
 
 
-def _restarts(fmu: Fmu, block: BlockPlan) -> StartValues:
-    given = {s.name: value for s, value in _starts(fmu, block)}
+def _restarts(fmu: Fmu, block: BlockPlan, time: Timeline) -> StartValues:
+    given = sizes(fmu.clock, time) | {s.name: value for s, value in _starts(fmu, block)}
     return tuple((s, given.get(s.name, value)) for s, value in fmu.starts)
 
 
@@ -315,28 +342,9 @@ def _connections(
     rows = haptic_loop.wires(rows, {n: d for n, d in described.items() if n not in own})
     paths: dict[str, Keys] = {f.name: ("fmu", i) for i, f in enumerate(scene.fmu)}
     wires = [(_path(w, paths), w) for w in rows if w.to not in fed]
-    loop = _connect_loop(wires, described, problems)
+    loop = tuple(connect(wires, described, problems))
     problems += check_partial_vectors(asked, rows, described)
     return tuple(c for _, c in (*loop, *asked))
-
-
-Ends = tuple[Sequence[tuple[Keys, Wire]], Mapping[str, Description]]
-_LOOPS: shelf.Shelf[tuple[Ends, tuple[tuple[Keys, Connection], ...]]] = shelf.Shelf(MAX_SYSTEMS)
-
-
-def _connect_loop(
-    wires: Sequence[tuple[Keys, Wire]],
-    described: Mapping[str, Description],
-    problems: list[Problem],
-) -> tuple[tuple[Keys, Connection], ...]:
-    """The haptic loop's connections, which systems of other rates and holds have, too."""
-    ends, found = (wires, described), list[Problem]()
-    known = _LOOPS.take(lambda item: item[0] == ends)
-    known = known or (ends, tuple(connect(wires, described, found)))
-    if not found:
-        _LOOPS.put(known)
-    problems += found
-    return known[1]
 
 
 def _path(wire: Wire, paths: Mapping[str, Keys]) -> Keys:

@@ -305,13 +305,15 @@ class System:
         rest = replace(self, fmus=fmus, energy=EnergyPorts(), timeline=_NO_TIME)
         return rest, names, self.energy.without_gains, changed, clocks
 
-    def restarted(self, starts: Iterable[Starts], energy: Callable[..., EnergyPorts]) -> System:
-        """The system with other start values of the same variables of its FMUs; `energy` gives the
-        energy ports of FMUs that have them."""
-        every = zip(self.fmus, starts, strict=True)
-        fmus = tuple(replace(fmu, starts=own) for fmu, own in every)
-        made = replace(self, fmus=fmus, energy=energy(fmus))
-        if made.energy.without_gains == self.energy.without_gains:
+    def restarted(
+        self, starts: Iterable[Starts], energy: Callable[..., EnergyPorts], time: Timeline
+    ) -> System:
+        """The system with other start values of the same variables of its FMUs, and other ticks of
+        the same clocks; `energy` gives the energy ports of FMUs that have them."""
+        fmus = tuple(replace(u, starts=s) for u, s in zip(self.fmus, starts, strict=True))
+        made = replace(self, fmus=fmus, energy=energy(fmus), timeline=time)
+        of_ticks = time is not self.timeline and any(c.latency for c in self.connections)
+        if made.energy.without_gains == self.energy.without_gains and not of_ticks:
             vars(made)["_of_objects"] = self._of_objects
         return made
 
