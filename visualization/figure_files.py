@@ -46,7 +46,7 @@ def load_matplotlib() -> None:
     from matplotlib import artist
 
     own, described = artist.Artist.set, artist.kwdoc
-    artist.kwdoc = lambda _: ""
+    artist.kwdoc = lambda artist: ""
     # Artists inherit a `set` that is not its own, where they have one made with its signature else.
     artist.Artist.set = lambda self, **given: own(self, **given)  # type: ignore[method-assign]
     import matplotlib.figure  # noqa: F401

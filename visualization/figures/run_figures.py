@@ -290,8 +290,7 @@ def _distance(results: Results) -> Figure:
     users = {u.name: curve(*pose_error(results, u)) for u in find_users(results)}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
-    most = f"{short(gap[at])} mm from {_point(largest)}, at {short(time[at])} s"
-    title = f"Handle at most {most}"
+    title = f"Handle at most {short(gap[at])} mm from {_point(largest)}, at {short(time[at])} s"
     figure, axes = titled_axes(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     for (user, error), style in zip(users.items(), cycle(STYLES)):
         axes.plot(*error[:2], style, label=plain(_point(user)))
