@@ -23,6 +23,7 @@ from hapticlink.commands.progress import progress
 from hapticlink.commands.stop_key import stop_key, wait_for_enter
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
+from hapticlink.visualization import figure_files
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -151,10 +152,11 @@ def run(
                 """Says what it can before figures are drawn: all but the names of the files."""
                 shown.close()
                 if not (result.fault or output.quiet or output.json):
-                    said.extend(summary.print_lines(result, title(scene), result.numbers))
-                    del said[-1]
+                    said.extend([*summary.print_lines(result, title(scene), result.numbers)][:-1])
                     say(*said, sep="\n")
                     sys.stdout.flush()
+                if figures:
+                    figure_files.load_matplotlib()
 
             result = hl.run(
                 read,

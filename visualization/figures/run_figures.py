@@ -290,8 +290,7 @@ def _distance(results: Results) -> Figure:
     users = {u.name: curve(*pose_error(results, u)) for u in find_users(results)}
     largest, (time, gap, _) = max(users.items(), key=lambda each: each[1][1].max(initial=0))
     at = int(gap.argmax())
-    most = f"{short(gap[at])} mm from {_point(largest)}, at {short(time[at])} s"
-    title = f"Handle at most {most}"
+    title = f"Handle at most {short(gap[at])} mm from {_point(largest)}, at {short(time[at])} s"
     figure, axes = titled_axes(results, title, "time (s)", "distance |x_S - x_D| (mm)")
     for (user, error), style in zip(users.items(), cycle(STYLES)):
         axes.plot(*error[:2], style, label=plain(_point(user)))
@@ -332,14 +331,9 @@ def _constraints(results: Results, times: Vector, numbers: Vector) -> Figure:
     if most < 10:
         axes.set(yticks=range(max(most, 3) + 1), ylim=(-0.15, max(most, 3) + 0.15))
     third = "rotation" if any(space_of(results).turns) else "z"
-    free = axes.secondary_yaxis("right", functions=(_free, _free))
+    free = axes.secondary_yaxis("right", functions=(lambda n: 3 - n,) * 2)  # its own inverse
     free.set(yticks=range(4), ylabel=f"directions free to move, of x, y and {third}")
     return figure
-
-
-def _free(constrained: Vector) -> Vector:
-    """The number of the three directions of motion that are not constrained; its own inverse."""
-    return 3 - constrained
 
 
 def _source(block: str) -> str:
@@ -364,8 +358,7 @@ def _port(results: Results, port: UserPort) -> Figure:
     if peak > summary.ROUNDING_J and port.blocks_J:
         largest = max(port.blocks_J, key=lambda name: float(port.blocks_J[name][at]))
         title += f"; largest source then: {_source(largest)}"
-    label = "energy at the user's port (mJ)"
-    figure, axes = titled_axes(results, title, "time (s)", label)
+    figure, axes = titled_axes(results, title, "time (s)", "energy at the user's port (mJ)")
     axes.plot(port.time_s, 1e3 * port.generated_J, "k", lw=1.8, label="generated in all")
     axes.plot(port.time_s, 1e3 * port.put_in_J, "k:", lw=1.2, label=f"put in by {whose}")
     least = DRAWN * np.abs(port.generated_J).max()
