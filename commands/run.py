@@ -23,7 +23,6 @@ from hapticlink.commands.progress import progress
 from hapticlink.commands.stop_key import stop_key, wait_for_enter
 from hapticlink.orchestrator.base.errors import Fault, InputFault
 from hapticlink.orchestrator.base.terminal_output import say
-from hapticlink.visualization import figure_files
 
 Figures = Annotated[bool, Parameter(help="Draw figures, which takes longer than many runs do.")]
 SetFile = Annotated[
@@ -155,8 +154,6 @@ def run(
                     said.extend([*summary.print_lines(result, title(scene), result.numbers)][:-1])
                     say(*said, sep="\n")
                     sys.stdout.flush()
-                if figures:
-                    figure_files.load_matplotlib()
 
             result = hl.run(
                 read,

@@ -35,9 +35,9 @@ CODE_LINES = {
     "orchestrator": 16914,
     "programs": 1047,
     "analysis": 9120,
-    "visualization": 3853,
+    "visualization": 3848,
     "api": 637,
-    "commands": 1640,
+    "commands": 1638,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

@@ -40,20 +40,6 @@ def formats(given: str) -> tuple[str, ...]:
     return asked
 
 
-def load_matplotlib() -> None:
-    """Loads Matplotlib without the lists of properties in the docstrings of its artists, a fifth of
-    the time that it takes: for a command, in which nobody reads them. It draws the same."""
-    from matplotlib import artist
-
-    own, described = artist.Artist.set, artist.kwdoc
-    artist.kwdoc = lambda artist: ""
-    # Artists inherit a `set` that is not its own, where they have one made with its signature else.
-    artist.Artist.set = lambda self, **given: own(self, **given)  # type: ignore[method-assign]
-    import matplotlib.figure  # noqa: F401
-
-    artist.Artist.set, artist.kwdoc = own, described  # type: ignore[method-assign]
-
-
 def encode(
     figure: Figure, kind: str, dpi: int = 150, more: Mapping[str, str] | None = None
 ) -> bytes:
