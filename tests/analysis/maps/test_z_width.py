@@ -163,10 +163,9 @@ def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(
 def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
     """Damping by differences of B T > 2 m alone turns the velocity over at each step: no stiffness
     helps."""
-    options = {**WALL, DAMPING: 500}
-    (row,) = hl.z_width(
-        "virtual-wall", FIRST, [f"delays.wall.F={T}"], options, out=tmp_path, jobs=1
-    )
+    options = {**WALL, STIFFNESS: 1000.0, DAMPING: 500, "delays.wall.F": T}
+    (job,) = jobs("virtual-wall", write_options(options), grid([]))
+    row = z_width._judge(job, tmp_path, STIFFNESS, 1000.0)
     assert (row["largest_stable"], row["stable"]) == (0.0, "none")
     assert row["message_stable"] == "all that was tried is unstable"
 
