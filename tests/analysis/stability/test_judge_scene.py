@@ -71,7 +71,8 @@ COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
     ("closed-loop-direct", {}, (42, 252, 3824)),
     ("closed-loop-direct", {"hold": "foh"}, (45, 292, 6424)),
 ]
-BEYOND = {"fmu.wall.start.stiffness": 20000.0, "packaging": "native"}
+Judged = tuple[hl.Stability, list[tuple[str, int, int]], SharedWork]
+BEYOND: dict[str, Any] = {"fmu.wall.start.stiffness": 20000.0, "packaging": "native"}
 
 
 def counted(work: SharedWork) -> tuple[int, ...]:
@@ -79,14 +80,13 @@ def counted(work: SharedWork) -> tuple[int, ...]:
 
 
 @pytest.fixture(scope="module")
-def beyond() -> tuple[hl.Stability, list[tuple[str, int, int]], SharedWork]:
+def beyond() -> Judged:
     """The verdict on a wall beyond its limit, what it told meanwhile, and how it was found."""
     told: list[tuple[str, int, int]] = []
     work = SharedWork()
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(judge_scene, "SharedWork", lambda run: replace(work, run=run))
-        tell = lambda *step: told.append(step)  # noqa: E731
-        found = hl.stability("virtual-wall", BEYOND, poses=1, progress=tell)
+        found = hl.stability("virtual-wall", BEYOND, poses=1, progress=lambda *s: told.append(s))
     return found, told, work
 
 
@@ -476,7 +476,7 @@ def test_a_verdict_that_is_interrupted_says_what_was_done(
         hl.stability("virtual-wall", poses=1, progress=tell)
 
 
-def test_a_verdict_tells_what_is_judged_and_counts_its_steps(beyond) -> None:
+def test_a_verdict_tells_what_is_judged_and_counts_its_steps(beyond: Judged) -> None:
     found, told, work = beyond
     assert counted(work) == (7, 27, 57)
     done = [k for _, k, _ in told]
@@ -490,7 +490,7 @@ def test_a_verdict_tells_what_is_judged_and_counts_its_steps(beyond) -> None:
     assert all(found.worst.hand in what for what, *_ in told if what.startswith("remedy"))
 
 
-def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds(beyond) -> None:
+def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds(beyond: Judged) -> None:
     """A wall of K on b = 5 N.s/m is passive up to K T/2 < b (Colgate, Schenkel 1997): 5120 N/m at
     512 Hz; four times as stiff it shakes, and the remedy, as it is printed, is stable in all hands
     when it is judged anew."""
