@@ -1,5 +1,6 @@
 """Settings of all tests."""
 
+import gc
 import os
 import signal
 from pathlib import Path
@@ -19,6 +20,11 @@ settings.load_profile("repeatable")
 # Matrices here have at most some dozen rows: threads of BLAS would only wait for each other, in
 # this process and in those that tests start. Read when NumPy is imported, which comes after.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
+
+# Hundreds of processes import the package, and each worker all tests: they share what is compiled.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+gc.disable()  # until all tests are imported, which leave no garbage
 
 # A shell that starts pytest in the background has it ignore Ctrl-C, which processes of tests would
 # inherit.
@@ -49,6 +55,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if items:
         items[0].config.stash[COLLECTED] = collected
     items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
+
+
+def pytest_collection_finish() -> None:
+    gc.freeze()  # modules and tests stay: no collection in a test looks through them
+    gc.enable()
 
 
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python

@@ -12,6 +12,7 @@ import time
 import pytest
 
 from hapticlink.commands.stop_key import stop_key, wait_for_enter
+from tests.shared_fixtures import status
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="a pseudo-terminal stands for the user")
 
@@ -57,19 +58,17 @@ def test_enter_says_that_it_is_done(keyboard, capsys):
     assert capsys.readouterr().err == "hold the handle in its home pose, then press Enter\n"
 
 
-def test_ctrl_c_ends_a_trial_that_waits_for_an_answer(tmp_path):
+def test_ctrl_c_ends_a_trial_that_waits_for_an_answer(tmp_path, monkeypatch, capsys):
     """And answers that are there are not written over."""
-    command = [sys.executable, "-m", "hapticlink", "trial", "closed-loop-2diy", "--out", "made"]
-    options = ("--vary", "graphics.rate=16", "--device", "simulated-board")
+    monkeypatch.chdir(tmp_path)
     (tmp_path / "made").mkdir()
-
-    def start() -> subprocess.Popen[str]:
-        return subprocess.Popen(
-            [*command, *options], cwd=tmp_path, stdin=subprocess.PIPE, stderr=subprocess.PIPE,
-            text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-        )  # fmt: skip
-
-    with start() as trial:
+    options = ("--vary", "graphics.rate=16", "--device", "simulated-board")
+    line = ["trial", "closed-loop-2diy", "--out", "made", *options]
+    with subprocess.Popen(
+        [sys.executable, "-m", "hapticlink", *line],
+        stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    ) as trial:  # fmt: skip
         assert trial.stderr
         while not (said := trial.stderr.readline()).endswith("[y/q]\n"):
             assert said
@@ -81,7 +80,6 @@ def test_ctrl_c_ends_a_trial_that_waits_for_an_answer(tmp_path):
         finally:
             trial.kill()
     (tmp_path / "made" / "answers.csv").write_text("trial,graphics.rate,varied,answer,right\n")
-    with start() as trial:
-        said = trial.communicate(timeout=60)[1]
-    assert trial.returncode == 2
-    assert "answers.csv: has answers of earlier trials: name another --out" in said
+    assert status(*line) == 2
+    told = capsys.readouterr().err
+    assert "answers.csv: has answers of earlier trials: name another --out" in told

@@ -102,12 +102,12 @@ TOOLS = ("fmpy", "pythonfmu")
 """Commands of other packages, which are installed beside Python."""
 
 
-def shown(command: str, folder: Path) -> str:
-    """A command as it is run: some with a shorter duration; after the first run of a page without
-    figures, which that one has drawn."""
+def shown(command: str, page: Path) -> str:
+    """A command as it is run: some with a shorter duration; without the figures of a run, which
+    tests/visualization has, but on the page that shows them."""
     limits = (f" --set duration={limit}" for key, limit in SHORTER.items() if key in command)
-    again = command.startswith("hapticlink run ") and (folder / "runs").exists()
-    return command + next(limits, "") + " --no-figures" * (again and "--no-fig" not in command)
+    undrawn = command.startswith("hapticlink run ") and page.stem != "first-run"
+    return command + next(limits, "") + " --no-figures" * (undrawn and "--no-fig" not in command)
 
 
 def first_pages() -> dict[str, Path]:
@@ -140,7 +140,7 @@ def failures(folder: Path, page: Path, block: Block) -> dict[str, str]:
         if FIRST_PAGES.get(command, page) != page:
             continue
         if words[0] == "hapticlink":
-            (ended,) = hapticlink(folder, shown(command, folder))
+            (ended,) = hapticlink(folder, shown(command, page))
             failed |= {command: ended.said} if ended.status else {}
         elif words[0] in TOOLS or (words[0] == "python" and (folder / words[1]).exists()):
             failed |= _failed(folder, str(Path(sys.executable).with_name(words[0])), *words[1:])

@@ -12,8 +12,10 @@ import pytest
 import hapticlink as hl
 from hapticlink.analysis.maps import z_width
 from hapticlink.analysis.stability import wall_limits
+from hapticlink.analysis.sweep.job import jobs
 from hapticlink.commands import stability
 from hapticlink.orchestrator.base.signal_names import HANDLE_VELOCITY
+from hapticlink.orchestrator.scene.overrides import write_options
 from hapticlink.visualization.figures.z_width_figure import finding
 from tests.analysis.stability.own_hand import DAMPED as WALL
 
@@ -111,36 +113,23 @@ def test_a_first_value_that_is_none_is_refused(first: str, tmp_path: Path) -> No
         hl.z_width("virtual-wall", first, ["haptics.rate=512"], WALL, out=tmp_path)
 
 
-def test_a_coupling_is_scaled_as_a_whole(tmp_path: Path) -> None:
-    """Half the graphics rate bears less."""
-    rows = hl.z_width(
-        "closed-loop-direct",
-        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
-        ["graphics.rate=32,64"],
-        SPRING,
-        out=tmp_path,
-        jobs=1,
-    )
-    slow, fast = (row["largest_stable"] for row in rows)
-    assert 0 < slow < fast
-
-
-def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(tmp_path: Path) -> None:
+def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """They are those of `zoh`, and a run beyond them stays bounded, which one with `zoh` does
-    not."""
+    not. A coupling is scaled as a whole, and half the graphics rate bears less."""
+    monkeypatch.setattr(z_width, "FINE", 0.3)
     options: dict[str, Any] = {**SPRING, "controller.teleoperation.damping": [5.0, 5.0, 0.005]}
-    rows = hl.z_width(
-        "closed-loop-direct",
-        "controller.teleoperation.stiffness=[100.0, 100.0, 0.1]",
-        ["hold=zoh,passive", "graphics.rate=32"],
-        options,
-        out=tmp_path,
-        jobs=1,
-    )
+    key, values = "controller.teleoperation.stiffness", [100.0, 100.0, 0.1]
+    begun = write_options({**options, key: values, "graphics.rate": 32})
+    points = [{"hold": "zoh"}, {"hold": "passive"}, {"hold": "zoh", "graphics.rate": "64"}]
+    made = jobs("closed-loop-direct", begun, points)
+    rows = [z_width._judge(job, tmp_path, key, values) for job in made]
+    assert 0 < rows[0]["largest_stable"] < rows.pop()["largest_stable"]
     assert rows[0]["largest_stable"] == rows[1]["largest_stable"]
     assert "judged_without" not in rows[0]
     assert "the friction of hold passive" in rows[1]["judged_without"]
-    *_, line = stability._of_limits(rows, ["hold"])
+    *_, line = stability._of_limits(rows, [])
     assert line.endswith("the friction of hold passive, taken out")
     K = 1.5 * rows[0]["largest_stable"]
     options |= {"controller.teleoperation.stiffness": [K, K, 1e-3 * K], "graphics.rate": 32}
@@ -161,10 +150,9 @@ def test_limits_of_the_hold_passive_are_told_to_be_without_its_friction(tmp_path
 def test_where_nothing_is_stable_the_verdicts_are_told(tmp_path: Path) -> None:
     """Damping by differences of B T > 2 m alone turns the velocity over at each step: no stiffness
     helps."""
-    options = {**WALL, DAMPING: 500}
-    (row,) = hl.z_width(
-        "virtual-wall", FIRST, [f"delays.wall.F={T}"], options, out=tmp_path, jobs=1
-    )
+    options = {**WALL, STIFFNESS: 1000.0, DAMPING: 500, "delays.wall.F": T}
+    (job,) = jobs("virtual-wall", write_options(options), [{}])
+    row = z_width._judge(job, tmp_path, STIFFNESS, 1000.0)
     assert (row["largest_stable"], row["stable"]) == (0.0, "none")
     assert row["message_stable"] == "all that was tried is unstable"
 

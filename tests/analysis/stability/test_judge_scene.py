@@ -71,6 +71,23 @@ COUNTS: list[tuple[str, dict[str, Any], tuple[int, int, int]]] = [
     ("closed-loop-direct", {}, (42, 252, 3824)),
     ("closed-loop-direct", {"hold": "foh"}, (45, 292, 6424)),
 ]
+Judged = tuple[hl.Stability, list[tuple[str, int, int]], SharedWork]
+BEYOND: dict[str, Any] = {"fmu.wall.start.stiffness": 20000.0, "packaging": "native"}
+
+
+def counted(work: SharedWork) -> tuple[int, ...]:
+    return tuple(work.counts[of] for of in ("equilibria", "differentiated", "products"))
+
+
+@pytest.fixture(scope="module")
+def beyond() -> Judged:
+    """The verdict on a wall beyond its limit, what it told meanwhile, and how it was found."""
+    told: list[tuple[str, int, int]] = []
+    work = SharedWork()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge_scene, "SharedWork", lambda run: replace(work, run=run))
+        found = hl.stability("virtual-wall", BEYOND, poses=1, progress=lambda *s: told.append(s))
+    return found, told, work
 
 
 @pytest.fixture(scope="module")
@@ -408,14 +425,15 @@ def test_a_verdict_takes_so_many_equilibria_slopes_and_products(
     work = SharedWork()
     monkeypatch.setattr(judge_scene, "SharedWork", lambda run: replace(work, run=run))
     hl.stability(scene, options | {"packaging": "native"})  # else as what lies in the cache
-    assert tuple(work.counts[of] for of in ("equilibria", "differentiated", "products")) == expected
+    assert counted(work) == expected
 
 
 def test_poses_that_share_what_they_find_have_the_cases_of_each_alone() -> None:
-    read = hl.scene("closed-loop-ideal")
+    read = hl.scene("closed-loop-ideal", {"packaging": "native"})
     assert read.linkage is not None
     poses = choose_evenly_spaced(simulate_scene(read, ("duration=1",)), read.linkage, 2)
-    shared, _ = in_poses(read, poses, HANDS, DRIFT)
+    shared, _ = in_poses(read, poses, HANDS, DRIFT, work=(work := SharedWork()))
+    assert counted(work) == (2, 28, 268)
     alone = [case for pose in poses for case in in_poses(read, [pose], HANDS, DRIFT)[0]]
     assert [case.pose for case in shared] == [case.pose for case in alone]
     assert [case.growth for case in shared] == [
@@ -458,14 +476,9 @@ def test_a_verdict_that_is_interrupted_says_what_was_done(
         hl.stability("virtual-wall", poses=1, progress=tell)
 
 
-def test_a_verdict_tells_what_is_judged_and_counts_its_steps() -> None:
-    told: list[tuple[str, int, int]] = []
-    found = hl.stability(
-        "virtual-wall",
-        {"fmu.wall.start.stiffness": 20000.0},
-        poses=1,
-        progress=lambda *step: told.append(step),
-    )
+def test_a_verdict_tells_what_is_judged_and_counts_its_steps(beyond: Judged) -> None:
+    found, told, work = beyond
+    assert counted(work) == (7, 27, 57)
     done = [k for _, k, _ in told]
     assert done == sorted(done)
     assert set(done) == set(range(done[-1] + 1))
@@ -477,12 +490,11 @@ def test_a_verdict_tells_what_is_judged_and_counts_its_steps() -> None:
     assert all(found.worst.hand in what for what, *_ in told if what.startswith("remedy"))
 
 
-def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
+def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds(beyond: Judged) -> None:
     """A wall of K on b = 5 N.s/m is passive up to K T/2 < b (Colgate, Schenkel 1997): 5120 N/m at
     512 Hz; four times as stiff it shakes, and the remedy, as it is printed, is stable in all hands
     when it is judged anew."""
-    beyond = {"fmu.wall.start.stiffness": 20000.0}
-    found = hl.stability("virtual-wall", beyond, poses=1)
+    found, *_ = beyond
     assert found.verdict == "unstable"
     assert found.worst.kind == "vibration"
     assert found.record()["growth_rate"] == found.growth == found.worst.growth > 0.0
@@ -493,7 +505,7 @@ def test_a_wall_beyond_its_limit_is_unstable_and_its_remedy_holds() -> None:
     assert {row.findtext("td") for row in shown.iter("tr")} >= {c.hand for c in found.cases}
     assert line in {entry.text for entry in shown.iter("li")}
     pasted = shlex.split(line.removeprefix("remedy: ").rpartition(": ")[0])[1::2]
-    again = hl.stability("virtual-wall", [*overrides.write_options(beyond), *pasted], poses=1)
+    again = hl.stability("virtual-wall", [*overrides.write_options(BEYOND), *pasted], poses=1)
     held = [c.growth for c in again.cases if not c.free and c.verdict != "marginal"]
     assert max(held) == pytest.approx(found.remedies[0].growth, rel=1e-9)
     marginal = {c.hand for c in again.cases if not c.free and c.verdict == "marginal"}
@@ -616,4 +628,4 @@ def test_fmus_are_compiled_for_a_verdict_where_contacts_are_many(
 
 def test_a_mechanism_alone_is_told_that_it_has_no_loop() -> None:
     with pytest.raises(hl.InputFault, match="a mechanism alone, without a sampled loop"):
-        hl.stability("six-bar")
+        hl.stability("pendulum")

@@ -92,7 +92,9 @@ def test_a_point_of_which_nothing_is_drawn_is_run_once() -> None:
 @pytest.fixture(scope="module")
 def swept(tmp_path_factory: pytest.TempPathFactory) -> hl.Sweep:
     out = tmp_path_factory.mktemp("repeated")
-    return hl.sweep("closed-loop-direct", {"hold": ["zoh", "foh"]}, VARYING, repeat=4, out=out)
+    return hl.sweep(
+        "closed-loop-direct", {"hold": ["zoh", "foh"]}, VARYING, repeat=4, out=out, jobs=1
+    )
 
 
 def test_quartiles_are_those_of_single_runs(swept: hl.Sweep) -> None:

@@ -60,7 +60,7 @@ def test_start_poses_of_one_choice_are_start_values(scene: str) -> None:
     for block, settings in _blocks(scene):
         linkage = settings["linkage"]
         poses, own = StartPoses(linkage), component(block, settings)
-        for seed in range(1, 6):
+        for seed in (1, 5):  # near, where all close, and far
             moved = _moved(linkage, seed)
             choice = poses.choose(moved.start)
             if choice is None:

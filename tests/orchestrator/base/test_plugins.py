@@ -241,7 +241,7 @@ def test_an_edited_plugin_makes_other_fmus_and_runs(tmp_path):
     """x = t^2/2 of 1 kg pushed with 1 N; a sweep runs again, a hold alone leaves the FMU."""
     (tmp_path / "scene.toml").write_text(SCENE)
     write(tmp_path, push=PUSH, mine=HOLD.format(name="mine"))
-    sweep = "hapticlink sweep scene.toml --plugin push --vary duration=0.5,1"
+    sweep = "hapticlink sweep scene.toml --plugin push --vary duration=0.5,1 --jobs 1"
     run = "hapticlink run scene.toml --plugin push --no-figures"
     cache = tmp_path / "cache"
 

@@ -68,7 +68,7 @@ def test_it_follows_the_mechanism_better_than_holds_in_time():
             "amplitude": [*rng.uniform(0.1, 0.6, 2), 0.0],
             "frequency": [*rng.uniform(0.3, 1.5, 2), 1.0],
         }
-        changes = {"hand": {"type": "profile", "table": wave}, "duration": 1.0}
+        changes = {"hand": {"type": "profile", "table": wave}, "duration": 0.5}
         changes |= {"controller.bias": "full", "graphics.rate": rate}
         own = hl.run("closed-loop-ideal", changes | {"directions_from": "mechanism"})
         for hold, found in beyond.items():

@@ -327,7 +327,9 @@ def test_a_hold_whose_attributes_cannot_be_saved(plugins, tmp_path):
 
 
 def test_a_sweep_starts_all_its_points_from_one_state(small, tmp_path):
-    found = hl.sweep(small, {"hand.damping": [[1.0, 1.0, 0.0], [3.0, 3.0, 0.0]]}, out=tmp_path)
+    found = hl.sweep(
+        small, {"hand.damping": [[1.0, 1.0, 0.0], [3.0, 3.0, 0.0]]}, out=tmp_path, jobs=1
+    )
     assert [row["end"] for row in found.rows] == ["duration"] * 2
     for row, damping in zip(found.rows, ([1.0, 1.0, 0.0], [3.0, 3.0, 0.0]), strict=True):
         alone = hl.run(small, {"hand.damping": damping})

@@ -125,7 +125,7 @@ def test_they_are_swept(tmp_path):
         f'graphics.rate = 32\n[holds]\n"{SIGNAL}" = {{ type = "weighted", weight = 0.0 }}\n'
     )
     line = f"hapticlink sweep mine.toml --plugin weighs --vary 'holds.\"{SIGNAL}\".weight=0.0,0.5'"
-    (ended,) = hapticlink(tmp_path, f"{line} --json --quiet --out swept", path=tmp_path)
+    (ended,) = hapticlink(tmp_path, f"{line} --json --quiet --jobs 1 --out swept", path=tmp_path)
     assert ended.status == 0, ended.said
     rows = json.loads(ended.said)["rows"]
     alone = [
