@@ -1,8 +1,8 @@
 """The growth rate of the leading motion in a run, from its rows alone.
 
-Snapshots are second differences of handle and mechanism over a hyperperiod, at every phase of it,
-which leaves out where they rest and what creeps on evenly. Fitted are two windows; what they do not
-agree on is not clean.
+Snapshots are the changes of handle and mechanism over a hyperperiod, at every phase of it, which
+leaves out where they rest; or changes of these, where something creeps on evenly. Fitted are two
+windows; what they do not agree on is not clean.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ FLOOR, LARGE = {True: 1e-14, False: 5e-13}, {True: 1e-5, False: 1e-4}
 """Changes of a coordinate (m, rad) between which a motion is neither rounding nor large, if it
 grows or decays: what is quadratic in a growing one grows twice as fast; what has decayed by four
 decades may end in a larger rounding."""
+CREEP = 0.01
+"""Rate (1/s) below which, and below a tenth of what is told, a mode is a creep of the rest."""
 SHARE = 0.02
 """Of the motion at the end of a window, from which a mode counts."""
 
@@ -45,9 +47,15 @@ class Growth:
         return bool(self.turn < 2 * np.pi * self.step and self.rate < 0.2)
 
 
-def growth_of(run: Any, step: float, grows: bool) -> Growth:
-    """The growth rate of a run, that is said to grow or to decay, in changes over `step` (s)."""
+def growth_of(run: Any, step: float, told: float) -> Growth:
+    """The growth rate of a run of which a rate is told, in changes over `step` (s)."""
     d = _changes(run, step)
+    found = _fit(d, step, told)
+    return _fit(np.diff(d, axis=0), step, told) if found.why else found
+
+
+def _fit(d: Array, step: float, told: float) -> Growth:
+    grows, creep = told > 0.0, min(CREEP, 0.1 * abs(told))
     size = np.linalg.norm(d, axis=1) / np.sqrt(max(1, d.shape[1]))
     floor = FLOOR[grows]
     if not grows:
@@ -62,7 +70,7 @@ def growth_of(run: Any, step: float, grows: bool) -> Growth:
     begin += (end - begin) // 6
     if end - begin < FEWEST:
         return Growth(why=f"{end - begin} periods between rounding and large motions")
-    found = [_leading(d[first:end], step) for first in (begin, (begin + end) // 2)]
+    found = [_leading(d[first:end], creep * step) for first in (begin, (begin + end) // 2)]
     if None in found:
         return Growth(why="no mode stands out of the motion")
     rates = [float(np.log(abs(z)) / step) for z in found if z is not None]
@@ -71,7 +79,7 @@ def growth_of(run: Any, step: float, grows: bool) -> Growth:
 
 
 def _changes(run: Any, step: float) -> Array:
-    """The second differences over each step, (k, phases and coordinates)."""
+    """The changes over each step, (k, phases and coordinates)."""
     columns = []
     for name, scale in SCALES.items():
         time, y = run.time(name), run[name]
@@ -80,15 +88,15 @@ def _changes(run: Any, step: float) -> Array:
             continue  # slower than the step
         whole = y[: len(y) // round(n) * round(n)].reshape(-1, round(n), y.shape[1])
         seen = whole[:, :: max(1, round(n) // PHASES)].reshape(len(whole), -1)
-        columns.append(np.diff(seen, 2, axis=0) * scale)
+        columns.append(np.diff(seen, axis=0) * scale)
     if not columns:
         return np.zeros((0, 1))
     return np.concatenate([c[: min(map(len, columns))] for c in columns], axis=1)
 
 
-def _leading(d: Array, step: float) -> complex | None:
+def _leading(d: Array, creep: float) -> complex | None:
     """The eigenvalue of the mode that grows most, or decays least, of those with a SHARE; what
     neither grows nor decays, nor turns, is a drift of the rest."""
     z, share = fit_modes(d, RANK)
-    moving = z[(share > SHARE) & (np.abs(z - 1.0) > 5e-4 * step)]
+    moving = z[(share > SHARE) & (np.abs(z - 1.0) > creep)]
     return complex(moving[np.argmax(np.abs(moving))]) if len(moving) else None

@@ -24,6 +24,8 @@ from which on they contradict."""
 LEAST, SLIGHT = 0.002, 0.01
 """The same (1/s), of rates that are nearly 0; and what grows by less than the second is marginal by
 the words of `stability`."""
+FAR = 1e-5
+"""Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift."""
 OWN = "free", "the scene's own damper"
 Row = dict[str, Any]
 
@@ -101,11 +103,18 @@ class Checked:
         )
         seconds = min(LONGEST[again], max((1 + again) * folds / max(abs(told), 1e-3), 30 * step))
         options = self.at_rest(pose, hand, small * NUDGES[again]) | dict(changes)
+        if len(options["connection"]) > 1:  # the hand's connections are one for each scalar
+            delays = dict(options.get("delays", {}))
+            for key in [key for key in delays if key.startswith("hand.F ->")]:
+                ends = [f"{end}[{i}]" for end in key.split(" -> ") for i in (1, 2, 3)]
+                late = delays.pop(key)
+                delays |= {f"{a} -> {b}": late for a, b in zip(ends[:3], ends[3:], strict=True)}
+            options["delays"] = delays
         try:
             run = hl.run(self.base, options | {"duration": max(seconds, 0.25)}, figures=False)
         except hl.InputFault as fault:
             return Growth(why=str(fault).splitlines()[0]), None
-        return growth_of(run, step, told > 0.0), run
+        return growth_of(run, step, told), run
 
 
 def _table(hand: Mapping[str, Any], place: Any, F: Any, nudge: Any) -> Row:
@@ -135,7 +144,8 @@ def compare(case: Mapping[str, Any], run: Growth) -> tuple[str, str]:
     turns = min(abs((turn + s * run.turn + np.pi) % (2 * np.pi) - np.pi) for s in (-1, 1))
     if off <= max(CLOSE * size, LEAST) + allowed:
         if turns > max(0.15, 0.1 * turn) and size > SLIGHT:
-            return "contradicted", f"{found}, turning by {run.turn:.3g} a step, not {turn:.3g}"
+            says = "contradicted" if told > 0.0 else "undecided"  # one beside it that is not seen
+            return says, f"{found}, turning by {run.turn:.3g} a step, not {turn:.3g}"
         return "agree", found
     return ("contradicted" if off > max(APART * size, 2 * LEAST) + allowed else "undecided"), found
 
@@ -231,9 +241,11 @@ def _grows(
             return None
         if ended.fault:
             return True
+        size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
+        if size.max() > FAR and not again:
+            return True
         if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
             return run.rate > max(SLIGHT, 2.2 * slow) and not run.drifts
-        size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
         early, late = (float(part.max()) for part in np.array_split(size, 8)[::7])
         if late > 100 * early:
             return True

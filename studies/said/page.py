@@ -33,10 +33,11 @@ def write(folder: Path, rows: Sequence[dict[str, Any]]) -> Path:
         "Made by `python -m studies.said` ([how](../../../studies/said/__init__.py)). Scenes are "
         "drawn with their seeds: linkages, devices, holds, rates, gains, delays, hands, walls, two "
         f"users. Growth rates agree within {CLOSE:.0%} or {LEAST:g} 1/s, the spread of the run's "
-        f"two windows and the told uncertainty; beyond {APART:.0%} they contradict. A margin agrees "
-        "where nothing but a drift grows at .9 times it, and something does at 1.1 times it, or a "
-        "haptic period to both sides. A remedy agrees where the scene with its options is told the "
-        "same rate, and a run shows it. Every number is in [said.jsonl](said.jsonl).",
+        f"two windows and the told uncertainty; beyond {APART:.0%} they contradict. A margin "
+        "agrees where nothing but a drift grows at .9 times it, and something does at 1.1 times "
+        "it; of delays and frames, a haptic period further. A remedy agrees where the scene with "
+        "its options is told the same rate, and a run shows it. Every number is in "
+        "[said.jsonl](said.jsonl).",
         "\n".join(table),
     ]
     for word in WORDS[1:]:
