@@ -81,7 +81,7 @@ def _draw(d: Draws) -> tuple[str, dict[str, Any]]:
     if own and not direct and d.happens(0.15):
         low = d.one_of(range(15, 40))
         options["graphics.rate"] = {"min": low, "max": low + 12, "seed": d.one_of(range(99))}
-        options |= {"controller.topology": True, "hold": d.one_of(["zoh", "foh", "lead"])}
+        options |= {"controller.topology": True, "hold": "zoh"}
         kind = "spring"
     if d.happens(0.2):
         late = d.one_of([1, 2, 3]) / rate
