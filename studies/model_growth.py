@@ -14,11 +14,8 @@ And the margin: the factor on the stiffnesses up to which the map is stable, or 
 the growth rates of map and run to both sides of it, BESIDE.
 
 The rate of a run is that of its slowest decay, or of its growth. Windows of it would mix modes that
-decay nearly alike. So its snapshots y_k, the handle's velocities of a whole period P of the map,
-are taken for those of a linear system, y_{k+1} = A y_k, whose eigenvalues z are those of A between
-the directions that the snapshots have (dynamic mode decomposition: Schmid, J. Fluid Mech. 656
-(2010), 5), and the rate is ln|z|/P. Each pair of snapshots is divided by the size of the first one,
-so that the last ones count as much.
+decay nearly alike, so it is that of the leading mode that `run_modes.py` fits to the handle's
+velocities of whole periods of the map.
 """
 
 from __future__ import annotations
@@ -39,9 +36,9 @@ import hapticlink as hl
 from hapticlink.analysis.stability.hand_slopes import hand_slopes
 from hapticlink.analysis.stability.modes import modes
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.orchestrator.base.arrays import Matrix
 from hapticlink.orchestrator.base.signal_names import HAND
 from studies.mismatch.cases import LINKAGES, Case
+from studies.run_modes import fit_modes
 
 OFF, FAR = 1e-9, 1e-3
 """From the start to the hand's target, in x and y (m)."""
@@ -51,8 +48,6 @@ LARGE, SMALL = 1e-6, 1e-11
 stiffness, and below which it is rounding."""
 SAME = 0.01
 """Difference of growth rates, relative to the larger one or to 1 1/s, that is none."""
-RANK = 1e-4
-"""Directions of snapshots, relative to the largest, that are none."""
 GAINS = {"medium": 100.0, "firm": 400.0}
 TOPOLOGY = 200.0, 50.0
 """Stiffness and damping of the topology controller, its defaults."""
@@ -154,18 +149,7 @@ def _of_one_run(cell: Cell, P: float) -> float:
     outside = np.flatnonzero((size > LARGE) | (size < SMALL))
     end = outside[0] if len(outside) else len(size)
     begin = end // 4  # what decays at once is left out
-    return float(np.log(np.abs(eigenvalues(snapshots[begin:end])).max()) / P)
-
-
-def eigenvalues(snapshots: Matrix) -> Matrix:
-    """Those of the linear system that takes each snapshot (a row) to the next one."""
-    scale = np.abs(snapshots[:-1]).max(axis=1)
-    X, Y = (part.T / scale for part in (snapshots[:-1], snapshots[1:]))
-    U, S, V = np.linalg.svd(X, full_matrices=False)
-    kept = min(np.count_nonzero(S / S[0] > RANK), len(scale) // 2)
-    A = U[:, :kept].T @ Y @ V[:kept].T / S[:kept]
-    found: Matrix = np.linalg.eigvals(A)
-    return found
+    return float(np.log(np.abs(fit_modes(snapshots[begin:end])[0]).max()) / P)
 
 
 def left_of(cell: Cell, hold: str) -> float:

@@ -129,8 +129,7 @@ class Pose:
         held = {"hand": standing(hand, np.add(self.point, (off[0], 0.0, off[2])))}
         run = simulate_for(LEAVING, read, {**self.started, **held})
         moved = np.abs(_read_poses(run)[POINT_POSE] - self.point).max(axis=0)
-        near = by_direction(self.space, NEAR, PER_METRE)
-        return bool(run.record.fault) or bool((moved > near).any())
+        return bool(fault_of(run) or (moved > by_direction(self.space, NEAR, PER_METRE)).any())
 
     @property
     def started(self) -> dict[str, object]:
@@ -203,7 +202,8 @@ def find_rest_pose(read: Scene, linkage: Linkage) -> Pose:
                 if judged_modes(all_modes)[0].growth < 0.0:  # else the run creeps past it
                     pose = pose.at_equilibrium(place, linkage)
                     return replace(pose, title=LED, found=f"{told} rests there")
-    moves = f"{told} still moves at up to {speed:.2g} rad/s or m/s after {SETTLING:g} s"
+    still = f"still moves at up to {speed:.2g}" if speed > AT_REST else f"moves below {AT_REST:g}"
+    moves = f"{told} {still} rad/s or m/s after {SETTLING:g} s"
     ends = (_average(run, linkage, since) for since in (1.0 - CALM, 1.0))
     near = [replace(pose, press=read.hand.wrench, title=LED) for pose in ends]
     tried: list[tuple[Pose, Options, str]] = [(p, free, "under that wrench") for p in near]

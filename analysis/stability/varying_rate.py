@@ -173,7 +173,7 @@ def edges_of(scene: Scene | None, system: System, place: int, lengths: list[int]
         if remembers and not _close(frame(low, middle, low), frame(low, middle, high)):
             raise InputFault(
                 "holds reach back by more than two frames: matrices of frames know the last one "
-                "only; take zoh, lead, foh or foh-derivative where the rate varies"
+                "only; take hold=zoh where the rate varies"
             )
         before = lengths if remembers else [middle]
         made = {(p, n): frame(p, n) for p in before for n in lengths}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -99,3 +100,16 @@ def test_frames_of_a_hold_that_keeps_lengths_are_those_of_its_equations() -> Non
     second = np.abs(np.linalg.eigvals(sum(np.kron(A, A) for A in frames) / len(frames))).max()
     found = varying_stability("virtual-wall", options)
     assert found.second_moment == pytest.approx(second, rel=1e-5)
+
+
+def test_the_hold_that_a_refusal_names_is_not_refused() -> None:
+    """foh and lead reach back by more than two frames where the graphics copy publishes late."""
+    target = [[0.0, 0.0445, 0.0148, -0.788]]
+    hand = {"type": "spring", "stiffness": [100.0, 100.0, 0.3], "target": target}
+    options = {"graphics.rate": {"min": 34, "max": 46, "seed": 37}, "hand": hand, "hold": "foh"}
+    with pytest.raises(hl.InputFault, match="more than two frames") as refused:
+        hl.equilibrium_stability("closed-loop-ideal", options)
+    named = re.findall(r"hold=([\w-]+)", str(refused.value))
+    assert named
+    for hold in named:
+        assert hl.equilibrium_stability("closed-loop-ideal", {**options, "hold": hold}).verdict

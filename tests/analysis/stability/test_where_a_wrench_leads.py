@@ -72,6 +72,22 @@ def test_of_equilibria_side_by_side_that_one_is_judged_in_which_the_scenes_own_r
     assert cases[OWN_FREE].growth == pytest.approx(decay, rel=0.01)
 
 
+def test_a_run_that_begins_there_with_its_handle_beside_the_point_stays(
+    led: tuple[Pose, dict[str, Case]],
+) -> None:
+    pose, _ = led
+    handle = [0.0, *(pose.handle or ())]
+    beside = {"connection": [{"from": {"table": [handle]}, "to": "haptic_device.x_start"}]}
+    start = BESIDE | {"linkage.start": pose.joints, "duration": 1.0, "stop_when": ""}
+
+    def leaves(options: dict[str, Any]) -> float:
+        x = hl.run("closed-loop-ideal", start | options, figures=False)["haptic_device.x_true"]
+        return float(np.abs(x - handle[1:]).max())
+
+    assert leaves(beside) < 1e-8
+    assert leaves({}) > 0.01
+
+
 def test_there_the_hand_gives_the_wrench_of_the_scene_and_some_direction_is_free(
     led: tuple[Pose, dict[str, Case]],
 ) -> None:
@@ -126,6 +142,14 @@ STRETCHED: dict[str, Any] = {
     "hand": {"type": "constant", "wrench": [0.152, 0.128, 0.0]},
 }
 """Of this five-bar one arm is almost stretched where the wrench leads it, and the handle creeps."""
+
+
+def test_a_run_that_hardly_moves_is_not_said_to_move_still() -> None:
+    """1e-6 N against 5 N.s/m of damping: 2e-7 m/s, in a scene with topology controller."""
+    read = hl.scene("closed-loop-ideal", {"hand": {"type": "constant", "wrench": [1e-6, 0.0, 0.0]}})
+    assert read.linkage is not None
+    pose = find_rest_pose(read, read.linkage)
+    assert "with 5 N.s/m of damping moves below 0.001 rad/s or m/s after 10 s" in pose.found
 
 
 def test_a_run_whose_handle_creeps_on_is_not_said_to_rest_and_no_grip_grows_there() -> None:

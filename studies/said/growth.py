@@ -1,0 +1,102 @@
+"""The growth rate of the leading motion in a run, from its rows alone.
+
+Snapshots are the changes of handle and mechanism over a hyperperiod, at every phase of it, which
+leaves out where they rest; or changes of these, where something creeps on evenly. Fitted are two
+windows; what they do not agree on is not clean.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from studies.run_modes import Array, fit_modes
+
+SCALES = {
+    "haptic_device.x_true": 1.0, "haptic_device.v_true": 0.1, "hand.F": 1e-3,
+    "virtual_mechanism.q": 1.0, "virtual_mechanism.qd": 0.1,
+}  # fmt: skip
+"""What is seen of a motion, and how large it counts (m or rad)."""
+PHASES, RANK, FEWEST = 6, 14, 3
+FLOOR, LARGE = {True: 1e-14, False: 5e-13}, {True: 1e-5, False: 1e-4}
+"""Changes of a coordinate (m, rad) between which a motion is neither rounding nor large, if it
+grows or decays: what is quadratic in a growing one grows twice as fast; what has decayed by four
+decades may end in a larger rounding."""
+CREEP = 0.01
+"""Rate (1/s) below which, and below a tenth of what is told, a mode is a creep of the rest."""
+SHARE = 0.02
+"""Of the motion at the end of a window, from which a mode counts."""
+
+
+@dataclass(frozen=True)
+class Growth:
+    """Growth rate (1/s), its spread between windows, and the turn over a step (rad) of `step`
+    seconds; or why none is found."""
+
+    rate: float = np.nan
+    spread: float = np.inf
+    turn: float = np.nan
+    step: float = np.nan
+    why: str = ""
+
+    @property
+    def drifts(self) -> bool:
+        """Slow in the words of `stability`: below 1 Hz and by less than 0.2 1/s."""
+        return bool(self.turn < 2 * np.pi * self.step and self.rate < 0.2)
+
+
+def growth_of(run: Any, step: float, told: float) -> Growth:
+    """The growth rate of a run of which a rate is told, in changes over `step` (s)."""
+    d = _changes(run, step)
+    found = _fit(d, step, told)
+    return _fit(np.diff(d, axis=0), step, told) if found.why else found
+
+
+def _fit(d: Array, step: float, told: float) -> Growth:
+    grows, creep = told > 0.0, min(CREEP, 0.1 * abs(told))
+    size = np.linalg.norm(d, axis=1) / np.sqrt(max(1, d.shape[1]))
+    floor = FLOOR[grows]
+    if not grows:
+        floor = max(floor, min(30 * size.min(initial=1.0), 1e-4 * size.max(initial=0.0)))
+    low, high = np.flatnonzero(size < floor), np.flatnonzero(size > LARGE[grows])
+    if grows:
+        end = int(high[0]) if len(high) else len(size)
+        begin = int(low[low < end][-1]) + 1 if (low < end).any() else 0
+    else:
+        begin = int(high[-1]) + 1 if len(high) else 0
+        end = int(low[low >= begin][0]) if (low >= begin).any() else len(size)
+    begin += (end - begin) // 6
+    if end - begin < FEWEST:
+        return Growth(why=f"{end - begin} periods between rounding and large motions")
+    found = [_leading(d[first:end], creep * step) for first in (begin, (begin + end) // 2)]
+    if None in found:
+        return Growth(why="no mode stands out of the motion")
+    rates = [float(np.log(abs(z)) / step) for z in found if z is not None]
+    turn = float(abs(np.angle(found[1])))  # type: ignore[arg-type]
+    return Growth(rates[1], abs(rates[0] - rates[1]), turn, step)
+
+
+def _changes(run: Any, step: float) -> Array:
+    """The changes over each step, (k, phases and coordinates)."""
+    columns = []
+    for name, scale in SCALES.items():
+        time, y = run.time(name), run[name]
+        n = step / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
+        if n < 0.999 or abs(n - round(n)) > 1e-6 or len(y) < round(n):
+            continue  # slower than the step
+        whole = y[: len(y) // round(n) * round(n)].reshape(-1, round(n), y.shape[1])
+        seen = whole[:, :: max(1, round(n) // PHASES)].reshape(len(whole), -1)
+        columns.append(np.diff(seen, axis=0) * scale)
+    if not columns:
+        return np.zeros((0, 1))
+    return np.concatenate([c[: min(map(len, columns))] for c in columns], axis=1)
+
+
+def _leading(d: Array, creep: float) -> complex | None:
+    """The eigenvalue of the mode that grows most, or decays least, of those with a SHARE; what
+    neither grows nor decays, nor turns, is a drift of the rest."""
+    z, share = fit_modes(d, RANK)
+    moving = z[(share > SHARE) & (np.abs(z - 1.0) > creep)]
+    return complex(moving[np.argmax(np.abs(moving))]) if len(moving) else None

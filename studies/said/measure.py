@@ -1,0 +1,356 @@
+"""The printed numbers of a scene, each with what runs say of it: agree, contradicted, or undecided
+and why."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+import hapticlink as hl
+from studies.said.growth import SCALES, Growth, growth_of
+
+NUDGES = (np.array([1.0, -0.7, 5.0]), np.array([-0.4, 1.0, -3.0]))
+"""Of the hand, in its three directions (m, m, rad), of one run and of the next one."""
+LONGEST = 60.0, 100.0
+"""Of a run and of the next one (s)."""
+CLOSE, APART = 0.03, 0.06
+"""Differences of growth rates, relative, up to which they agree, as a run is not quite small, and
+from which on they contradict."""
+LEAST, SLIGHT = 0.002, 0.01
+"""The same (1/s), of rates that are nearly 0; and what grows by less than the second is marginal by
+the words of `stability`."""
+FAR = 1e-5
+"""Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift."""
+OWN = "free", "the scene's own damper"
+Row = dict[str, Any]
+
+
+class Checked:
+    """A scene with its verdict."""
+
+    def __init__(self, base: str, options: Mapping[str, Any]) -> None:
+        self.base, self.options = base, dict(options)
+        self.varies = isinstance(self.options["graphics.rate"], Mapping)
+        told = (hl.equilibrium_stability if self.varies else hl.stability)(base, self.options)
+        self.record, self.finding = told.record(), getattr(told, "finding", told.verdict)
+        self.own = hl.run(base, self.options, figures=False)
+        scene = hl.scene(base, self.options)
+        self.haptic = Fraction(str(scene.haptics.rate))
+        slow = scene.graphics.rate if scene.graphics and not self.varies else self.haptic
+        self.graphics = Fraction(str(slow))
+
+    def ends(self, source: str) -> list[str]:
+        """What a signal is connected to."""
+        pairs = (c.split(" -> ") for c in self.own.run["connections"])
+        return [end for start, end in pairs if start == source]
+
+    def at_rest(self, pose: str, hand: Mapping[str, Any], nudge: Any) -> dict[str, Any]:
+        """The options of a run that begins in the equilibrium of a pose, nudged, in a hand."""
+        at = self.record["equilibria"][pose]
+        place, F = np.array(at["handle"] or at["point"]), np.array(at["press"])
+        off = np.resize([1.0, -0.6, 0.3, 0.8], len(at["joints"])) * nudge[0]
+        start = [0.0, *(place + 0.3 * np.roll(nudge, 1) * [0.2, 1.0, 1.0])]
+        brought: list[Row] = [{"from": {"table": [start]}, "to": "haptic_device.x_start"}]
+        if hand["type"] == "arm" and F.any():
+            brought += [
+                {"from": f"hand.F[{i}]", "to": f"{end}[{i}]", "offset": F[i - 1]}
+                for end in self.ends("hand.F")
+                for i in (1, 2, 3)
+            ]
+            F = np.zeros(3)
+        options = {k: v for k, v in self.options.items() if k.partition(".")[0] != "hand"}
+        for user, there in at["others"].items():
+            options[f"hands.{user}"] = _table(hand, np.array(there), np.zeros(3), -0.6 * nudge)
+        return options | {
+            "hand": _table(hand, place, F, nudge),
+            "connection": brought,
+            "linkage.start": {
+                joint: np.add(x, dx).tolist()
+                for (joint, x), dx in zip(at["joints"].items(), off, strict=True)
+            },
+            "linkage.start_velocity": {},
+            "record": {"signals": [*SCALES], "format": "rows"},
+            "stop_when": "",
+        }
+
+    def step(self, told: float, changes: Mapping[str, Any]) -> float:
+        """The hyperperiod (s), or about a frame where motions change much over it."""
+        fast = Fraction(str(changes.get("haptics.rate", self.haptic)))
+        slow = Fraction(str(changes.get("graphics.rate", self.graphics)))
+        whole = math.gcd(fast.numerator * slow.denominator, slow.numerator * fast.denominator)
+        period = Fraction(fast.denominator * slow.denominator, whole)
+        return float(period if abs(told) * period < 0.5 else round(fast / slow) / fast)
+
+    def run(
+        self,
+        pose: str,
+        hand: Mapping[str, Any],
+        told: float,
+        changes: Mapping[str, Any],
+        again: int,
+    ) -> tuple[Growth, Any]:
+        """The growth rate of a run in a pose and a hand; `told` is how fast it may be."""
+        step = self.step(told, changes)
+        small, folds = (
+            (1e-15 if told > 5.0 else 1e-12 if told > 1.0 else 1e-9, 20.0)
+            if told > 0.0
+            else (5e-7, 20.0)
+        )
+        seconds = min(LONGEST[again], max((1 + again) * folds / max(abs(told), 1e-3), 30 * step))
+        options = self.at_rest(pose, hand, small * NUDGES[again]) | dict(changes)
+        if len(options["connection"]) > 1:  # the hand's connections are one for each scalar
+            delays = dict(options.get("delays", {}))
+            for key in [key for key in delays if key.startswith("hand.F ->")]:
+                ends = [f"{end}[{i}]" for end in key.split(" -> ") for i in (1, 2, 3)]
+                late = delays.pop(key)
+                delays |= {f"{a} -> {b}": late for a, b in zip(ends[:3], ends[3:], strict=True)}
+            options["delays"] = delays
+        try:
+            run = hl.run(self.base, options | {"duration": max(seconds, 0.25)}, figures=False)
+        except hl.InputFault as fault:
+            return Growth(why=str(fault).splitlines()[0]), None
+        return growth_of(run, step, told), run
+
+
+def _table(hand: Mapping[str, Any], place: Any, F: Any, nudge: Any) -> Row:
+    """The [hand] table that stands still at a pose, nudged, and presses with F."""
+    left_out = "interpolation", "timing"
+    table = {k: v for k, v in hand.items() if v is not None and k not in left_out}
+    if table["type"] in ("constant", "profile"):
+        off = F + nudge * np.array([100.0, 100.0, 0.2])
+        damped = {"damping": table["damping"]} if table.get("damping") else {}
+        rows = [[0.0, *off.tolist()], [0.05, *F.tolist()]]
+        return {"type": "profile", "table": rows, "interpolation": "hold", **damped}
+    k = np.array(table["stiffness"])
+    target = place + np.divide(F, k, out=np.zeros(3), where=k > 0) + nudge
+    return table | {"target": [[0.0, *target.tolist()]]}
+
+
+def compare(case: Mapping[str, Any], run: Growth) -> tuple[str, str]:
+    """agree, contradicted or undecided, and why."""
+    if run.why:
+        return "undecided", run.why
+    told, found = case["growth_rate"], f"run {run.rate:.4g} +- {run.spread:.2g} 1/s"
+    off, size = abs(run.rate - told), max(abs(told), abs(run.rate))
+    allowed = 2 * run.spread + case["uncertainty"]
+    if run.spread > max(0.05 * size, LEAST):
+        return "undecided", f"the run is not clean: {found}"
+    turn = 2 * np.pi * case["frequency"] * run.step
+    turns = min(abs((turn + s * run.turn + np.pi) % (2 * np.pi) - np.pi) for s in (-1, 1))
+    if off <= max(CLOSE * size, LEAST) + allowed:
+        if turns > max(0.15, 0.1 * turn) and size > SLIGHT:
+            says = "contradicted" if told > 0.0 else "undecided"  # one beside it that is not seen
+            return says, f"{found}, turning by {run.turn:.3g} a step, not {turn:.3g}"
+        return "agree", found
+    return ("contradicted" if off > max(APART * size, 2 * LEAST) + allowed else "undecided"), found
+
+
+def claims(scene: Checked) -> Iterator[Row]:
+    """All printed numbers, with what runs say of them."""
+    yield from _energies(scene)
+    if scene.varies:
+        yield _exponent(scene)
+        return
+    for hand in dict.fromkeys(c["hand"] for c in scene.record["cases"]):
+        yield _rate(scene, max((c for c in scene.record["cases"] if c["hand"] == hand), key=_rank))
+    yield from _damping(scene)
+    yield from _margins(scene)
+    yield from _remedies(scene)
+
+
+def _row(what: str, told: float, says: str, why: str) -> Row:
+    return {"what": what, "told": told, "says": says, "why": why}
+
+
+def _energies(scene: Checked) -> Iterator[Row]:
+    """What the hand of the scene's own run put in, and what was generated at its port, (J), by sums
+    over rows: each force is held over a step."""
+    told = scene.own.run["user_port"]
+    if not isinstance(told, Mapping) or scene.base == "two-users":
+        return
+    F, x, E = (scene.own[s] for s in ("hand.F", "haptic_device.x_true", "virtual_mechanism.energy"))
+    n = min(map(len, (F, x, E)))
+    put_in = np.concatenate([[0.0], np.cumsum(np.sum(F[: n - 1] * np.diff(x[:n], axis=0), axis=1))])
+    if len(scene.own.time("virtual_mechanism.energy")) != len(scene.own.time("hand.F")):
+        return
+    generated = E[:n].ravel() - E[0] - put_in
+    for what, J, by_rows in (
+        ("energy generated (J)", told["generated"], generated[-1]),
+        ("most energy generated (J)", told["peak"], generated.max()),
+    ):
+        near = abs(J - by_rows) <= 1e-9 + 1e-6 * max(np.abs(put_in).max(), np.ptp(E))
+        yield _row(what, J, "agree" if near else "contradicted", f"rows {by_rows:.6g} J")
+
+
+def _exponent(scene: Checked) -> Row:
+    """The Lyapunov exponent of a rate that varies, by the slope of the logarithm of what moves."""
+    told, wide = scene.record["lyapunov_exponent"], 3 * scene.record["confidence"]
+    row = "Lyapunov exponent (1/s)", told
+    run = hl.run(scene.base, scene.options | {"duration": LONGEST[0]}, figures=False)
+    d = np.linalg.norm(np.diff(run["haptic_device.x_true"], axis=0), axis=1)
+    n = int(scene.haptic) // 4
+    size = np.array([d[i : i + n].max() for i in range(0, len(d) - n, n)])
+    moving = np.flatnonzero((size < 1e-6) & (size > 1e-13))
+    if len(moving) < 16:
+        return _row(*row, "undecided", "less than 4 s between rounding and large motions")
+    slope = float(np.polyfit(moving / 4, np.log(size[moving]), 1)[0])
+    off = abs(slope - told)
+    far = off > max(3 * wide, 0.3 * abs(told))
+    near = off < max(wide, 0.1 * abs(told))
+    return _row(
+        *row, "agree" if near else "contradicted" if far else "undecided", f"run {slope:.4g}"
+    )
+
+
+def _rank(case: Mapping[str, Any]) -> tuple[bool, bool, bool, float]:
+    grows = case["verdict"] == "unstable"
+    fast = grows and case["kind"] != "drift"
+    return fast, grows, case["verdict"] == "marginal", case["growth_rate"]
+
+
+def _rate(scene: Checked, case: Mapping[str, Any]) -> Row:
+    """The growth rate of a hand. A run that shows less than was told may leave out a mode: a second
+    one begins otherwise, and is longer."""
+    told, hand = case["growth_rate"], scene.record["hands"][case["hand"]]
+    step = scene.step(told, {})
+    row = f"{case['hand']} at {case['pose']} (1/s)", told
+    if case["saturated"]:
+        return _row(*row, "undecided", "motors at their limit, which any motion takes them off")
+    if abs(told) * step > 1.0 and (scene.haptic / scene.graphics).denominator > 1:
+        return _row(*row, "undecided", "too fast for frames of different lengths")
+    for again in (0, 1):
+        run, _ = scene.run(case["pose"], hand, told, {}, again)
+        says, why = compare(case, run)
+        if says == "agree" or (says == "contradicted" and run.rate > told):
+            break
+    return _row(*row, says, why)
+
+
+def _grows(
+    scene: Checked, pose: str, hand: str, changes: Mapping[str, Any], slow: float = 0.0
+) -> bool | None:
+    """Whether more than a drift, and than twice `slow`, grows; None where that is not clean."""
+    for again in (0, 1):
+        run, ended = scene.run(pose, scene.record["hands"][hand], 1.0 - 0.9 * again, changes, again)
+        if ended is None:
+            return None
+        if ended.fault:
+            return True
+        size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
+        if size.max() > FAR and not again:
+            return True
+        if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
+            return run.rate > max(SLIGHT, 2.2 * slow) and not run.drifts
+        early, late = (float(part.max()) for part in np.array_split(size, 8)[::7])
+        if late > 100 * early:
+            return True
+        if late < early / 100:
+            return False
+    return None
+
+
+def _in_hands(scene: Checked, changes: Mapping[str, Any], most: int) -> tuple[bool | None, str]:
+    """Whether something grows in the worst pose in some of at most so many hands with changes."""
+    worst, clean = scene.record["worst"], True
+    cases = {c["hand"]: c for c in scene.record["cases"] if c["pose"] == worst["pose"]}
+    names = sorted((h for h in cases if h not in OWN), key=lambda h: -cases[h]["growth_rate"])
+    for hand in names[:most]:
+        slow = cases[hand]["growth_rate"] if cases[hand]["verdict"] == "marginal" else 0.0
+        grows = _grows(scene, worst["pose"], hand, changes, slow)
+        if grows:
+            return True, f"{hand} grows"
+        clean = clean and grows is False
+    return (False, "none grows") if clean else (None, "not clean in some hand")
+
+
+def _damping(scene: Checked) -> Iterator[Row]:
+    """The damping with which small motions of a free handle decay at .1 1/s, and half of it."""
+    for case in scene.record["cases"]:
+        b = case["damping_needed"]
+        if b is None or b != scene.record["damping_needed_in_free_air"] or not math.isfinite(b):
+            continue
+        rates = []
+        for damping in (b, b / 2):
+            hand = {"type": "constant", "damping": [damping, damping, 1e-3 * damping]}
+            rates.append(scene.run(case["pose"], hand, -0.1, {}, 0)[0])
+        says = "agree" if rates[0].rate < -0.09 and rates[1].rate > -0.11 else "contradicted"
+        if any(r.why or r.spread > 0.01 for r in rates):
+            says = "undecided"
+        why = ", ".join(r.why or f"{r.rate:.3g}" for r in rates)
+        yield _row(f"damping in free air at {case['pose']} (N.s/m)", b, says, f"runs {why}")
+        return
+
+
+def _margins(scene: Checked) -> Iterator[Row]:
+    margin, options, haptic = scene.record["margin"], scene.options, float(scene.haptic)
+    pairs = (c.split(" -> ") for c in scene.own.run["connections"])
+    reads = [" -> ".join(p) for p in pairs if p[1].startswith("controller")]
+
+    def scaled(s: float) -> Row:
+        found: Row = {}
+        for key, by in (("stiffness", s), ("damping", s**0.5)):
+            name = f"controller.teleoperation.{key}"
+            found[name] = [gain * by for gain in options[name]]
+        if options["controller.topology"]:
+            found["controller.topology"] = {"stiffness": 200.0 * s, "damping": 50.0 * s**0.5}
+        return found
+
+    def later(n: float) -> Row:
+        given = {str(k): float(v) for k, v in options.get("delays", {}).items()}
+        late = {c: given.get(c.partition(" -> ")[0], 0.0) + n / haptic for c in reads}
+        return {"delays": given | late if n else given}
+
+    def framed(n: float) -> Row:
+        return {"graphics.rate": f"{scene.haptic}/{n:g}"}
+
+    for name, change in (("stiffness", scaled), ("delay", later), ("rate", framed)):
+        if (told := margin[name]) is None:
+            continue
+        inside, outside = 0.9 * told, 1.1 * told or 2.0**-10
+        if name != "stiffness":
+            inside = round(told * haptic) if name == "delay" else int(haptic / told + 1e-6)
+            outside = inside + 1
+        open_end = name in margin["not_searched_further"]
+        below = _in_hands(scene, change(inside), 2) if inside else (False, "")
+        above = (True, "not told") if open_end else _in_hands(scene, change(outside), 9)
+        says = "undecided" if None in (below[0], above[0]) else "contradicted"
+        if (below[0], above[0]) == (False, True):
+            says = "agree"
+        why = f"at {inside:.4g}: {below[1]}; at {outside:.4g}: {above[1]}"
+        yield _row(f"margin of {name}", told, says, why)
+
+
+def _remedies(scene: Checked) -> Iterator[Row]:
+    """Each by the scene with its options, of which a run is to show the rate that it is told."""
+    for remedy in scene.record["remedies"]:
+        told, what = remedy["growth"], f"remedy {' '.join(remedy['options'])} (1/s)"
+        try:
+            there = Checked(scene.base, scene.options | dict(map(_value, remedy["options"])))
+        except (hl.InputFault, hl.Fault) as fault:
+            yield _row(what, told, "contradicted", str(fault).splitlines()[0])
+            continue
+        held = [
+            c
+            for c in there.record["cases"]
+            if c["hand"] not in OWN
+            and c["verdict"] != "marginal"
+            and (c["verdict"], c["kind"]) != ("unstable", "drift")
+        ]
+        row = _rate(there, max(held, key=_rank))
+        limit = told + max(CLOSE * abs(told), LEAST) if math.isfinite(told) else SLIGHT
+        if (fast := max(c["growth_rate"] for c in held)) > limit:
+            row |= {"says": "contradicted", "why": f"with these options {fast:.4g} is told"}
+        yield row | {"what": f"{what}: {row['what']}", "told": told}
+
+
+def _value(option: str) -> tuple[str, Any]:
+    key, _, text = option.partition("=")
+    try:
+        return key, tomllib.loads(f"v = {text}")["v"]
+    except tomllib.TOMLDecodeError:
+        return key, text

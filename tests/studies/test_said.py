@@ -1,0 +1,60 @@
+"""What the study of printed numbers takes for the growth rate of a run, and for a contradiction."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from studies.said.growth import SCALES, growth_of
+from studies.said.measure import compare
+
+P, RATE = 0.05, 400
+
+
+class Motion:
+    """The rows of a run of which two modes move handle and mechanism, and an even creep (m/s)."""
+
+    def __init__(
+        self, rate: float, hertz: float, size: float, seconds: float, creep: float = 0.0
+    ) -> None:
+        self.t = np.arange(round(seconds * RATE)) / RATE
+        turning = np.cos(2 * np.pi * hertz * self.t + 0.3)
+        fast = 5.0 * np.exp(-9.0 * self.t)
+        self.x = 0.05 + size * (np.exp(rate * self.t) * turning + fast) + creep * self.t
+
+    def time(self, name: str) -> Any:
+        return self.t
+
+    def __getitem__(self, name: str) -> Any:
+        weights = np.linspace(1.0, 2.0, 3) + list(SCALES).index(name)
+        return self.x[:, None] * weights
+
+
+@pytest.mark.parametrize(
+    ("rate", "hertz", "size"), [(-0.6, 0.7, 3e-7), (-2.0, 0.0, 3e-7), (1.5, 3.0, 1e-10)]
+)
+def test_growth_and_decay_are_those_of_the_slowest_mode(
+    rate: float, hertz: float, size: float
+) -> None:
+    found = growth_of(Motion(rate, hertz, size, 8.0), P, rate)
+    assert found.rate == pytest.approx(rate, abs=0.005)
+    told = {"growth_rate": rate, "frequency": hertz, "uncertainty": 0.0}
+    assert compare(told, found)[0] == "agree"
+    for wrong in ({"growth_rate": 1.1 * rate}, {"growth_rate": -rate}):
+        assert compare(told | wrong, found)[0] == "contradicted"
+    said = "contradicted" if rate > 0.0 else "undecided"
+    assert compare(told | {"frequency": hertz + 4.0}, found)[0] == said
+
+
+def test_what_creeps_on_evenly_hides_no_mode() -> None:
+    found = growth_of(Motion(-2.0, 0.0, 3e-7, 20.0, creep=1e-9), P, -2.0)
+    assert found.rate == pytest.approx(-2.0, abs=0.01)
+
+
+def test_what_is_not_clean_decides_nothing() -> None:
+    motion = Motion(-2.0, 0.0, 3e-7, 8.0)
+    motion.x += 1e-9 * np.random.Generator(np.random.PCG64(1)).standard_normal(len(motion.x))
+    told = {"growth_rate": -0.5, "frequency": 0.0, "uncertainty": 0.0}
+    assert compare(told, growth_of(motion, P, -0.5))[0] == "undecided"
