@@ -99,7 +99,7 @@ class Checked:
         small, folds = (
             (1e-15 if told > 5.0 else 1e-12 if told > 1.0 else 1e-9, 20.0)
             if told > 0.0
-            else (5e-7, 20.0)
+            else (5e-7, 30.0)  # until nothing but the creep of the rest is left
         )
         seconds = min(LONGEST[again], max((1 + again) * folds / max(abs(told), 1e-3), 30 * step))
         options = self.at_rest(pose, hand, small * NUDGES[again]) | dict(changes)
