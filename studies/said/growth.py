@@ -63,20 +63,18 @@ def growth_of(run: Any, step: float, told: float) -> Growth:
 
 def _fit(d: Array, step: float, told: float) -> Growth:
     grows, creep = told > 0.0, min(CREEP, 0.1 * abs(told))
-    early, late = (part.mean(axis=0) for part in np.array_split(d, 16)[-2:])
-    if len(d) >= 16 and not grows and np.linalg.norm(late - early) < EVEN * np.linalg.norm(late):
-        d = d - late
+    if not grows and len(d) >= 16:
+        before, rest = (part.mean(axis=0) for part in np.array_split(d, 16)[-2:])
+        d = d - rest * (np.linalg.norm(rest - before) < EVEN * np.linalg.norm(rest))
     size = np.linalg.norm(d, axis=1) / np.sqrt(max(1, d.shape[1]))
     floor = FLOOR[grows]
     if not grows:
         floor = max(floor, min(30 * size.min(initial=1.0), 1e-4 * size.max(initial=0.0)))
-    low, high = np.flatnonzero(size < floor), np.flatnonzero(size > LARGE[grows])
+    falls = size[::-1] if grows else size  # what grows decays backwards
+    begin = max(np.flatnonzero(falls > LARGE[grows]) + 1, default=0)
+    end = min(np.flatnonzero(falls[begin:] < floor) + begin, default=len(size))
     if grows:
-        end = int(high[0]) if len(high) else len(size)
-        begin = int(low[low < end][-1]) + 1 if (low < end).any() else 0
-    else:
-        begin = int(high[-1]) + 1 if len(high) else 0
-        end = int(low[low >= begin][0]) if (low >= begin).any() else len(size)
+        begin, end = len(size) - end, len(size) - begin
     begin += (end - begin) // 6
     if end - begin < FEWEST:
         return Growth(why=f"{end - begin} periods between rounding and large motions")

@@ -74,6 +74,10 @@ def test_a_slow_decay_is_no_creep() -> None:
     )
 
 
+def test_a_run_that_is_too_short_decides_nothing() -> None:
+    assert "0 periods" in growth_of(Motion(-2.0, 0.0, 3e-7, 0.05), P, -2.0).why
+
+
 def test_what_is_not_clean_decides_nothing() -> None:
     motion = Motion(-2.0, 0.0, 3e-7, 8.0)
     motion.x += 1e-9 * np.random.Generator(np.random.PCG64(1)).standard_normal(len(motion.x))
