@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import json
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -44,9 +45,9 @@ def main() -> None:
         row = judged(seed)
         with path.open("a", encoding="utf-8") as out:
             print(json.dumps(row, default=float), file=out)
-        said = [claim["says"] for claim in row.get("claims", [])]
-        counts = ", ".join(f"{said.count(s)} {s}" for s in sorted({*said}))
-        print(f"{seed}: {counts}{row.get('refused', '')}", flush=True)
+        said = Counter(claim["says"] for claim in row.get("claims", []))
+        counts = ", ".join(f"{n} {word}" for word, n in said.items())
+        print(f"{seed}: {counts or row.get('refused')}", flush=True)
     print(write(asked.out, _rows(path)))
 
 

@@ -12,12 +12,7 @@ import hapticlink as hl
 DEVICES = ["twin", "twin", "twin", "twin", "2diy", "stage", "pantograph-mk-ii", "paddle"]
 HOLDS = ["zoh", "zoh", "foh", "lead", "passive", "second-order", "slope", "hermite", "model"]
 KINDS = ["constant", "constant", "damped", "spring", "arm"]
-LINKAGES = {
-    "five-bar": (),
-    "serial": (0.4, -1.9),
-    "triple": (0.4, -1.9, 0.5),
-    "slider": (0.4, -1.9),
-}
+ANGLES = {"five-bar": (), "serial": (0.4, -1.9), "triple": (0.4, -1.9, 0.5), "slider": (0.4, -1.9)}
 """Angles from which those of own chains are drawn, up to 0.8 rad more."""
 TRIES = 50
 
@@ -109,8 +104,8 @@ def _hand(d: Draws, kind: str, base: str, options: Mapping[str, Any]) -> dict[st
 
 def _linkage(d: Draws) -> dict[str, Any]:
     """Own masses of the five-bar, or a chain of two or three links, or one in a slot; some fall."""
-    kind = d.one_of([*LINKAGES])
-    angles = [round(angle + d.between(0.0, 0.8), 3) for angle in LINKAGES[kind]]
+    kind = d.one_of([*ANGLES])
+    angles = [round(angle + d.between(0.0, 0.8), 3) for angle in ANGLES[kind]]
     names = [f"link{i + 1}" for i in range(len(angles) or 4)]
     a, m = ([round(x * d.times(f), 4) for _ in names] for x, f in ((0.042, 1.3), (1.0, 2.5)))
     options: dict[str, Any] = {}

@@ -4,7 +4,6 @@ and why."""
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 import hapticlink as hl
+from hapticlink.orchestrator.scene.overrides import parse
 from studies.said.growth import SCALES, Growth, growth_of
 
 NUDGES = (np.array([1.0, -0.7, 5.0]), np.array([-0.4, 1.0, -3.0]))
@@ -27,7 +27,11 @@ the words of `stability`."""
 FAR = 1e-5
 """Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift."""
 OWN = "free", "the scene's own damper"
+LEFT_OUT = "interpolation", "timing"
 Row = dict[str, Any]
+Ended = tuple[Growth, Any]
+Claim = tuple[str, float, str, str]
+COLUMNS = "what", "told", "says", "why"
 
 
 class Checked:
@@ -39,15 +43,11 @@ class Checked:
         told = (hl.equilibrium_stability if self.varies else hl.stability)(base, self.options)
         self.record, self.finding = told.record(), getattr(told, "finding", told.verdict)
         self.own = hl.run(base, self.options, figures=False)
+        self.connections = [c.split(" -> ") for c in self.own.run["connections"]]
         scene = hl.scene(base, self.options)
         self.haptic = Fraction(str(scene.haptics.rate))
         slow = scene.graphics.rate if scene.graphics and not self.varies else self.haptic
         self.graphics = Fraction(str(slow))
-
-    def ends(self, source: str) -> list[str]:
-        """What a signal is connected to."""
-        pairs = (c.split(" -> ") for c in self.own.run["connections"])
-        return [end for start, end in pairs if start == source]
 
     def at_rest(self, pose: str, hand: Mapping[str, Any], nudge: Any) -> dict[str, Any]:
         """The options of a run that begins in the equilibrium of a pose, nudged, in a hand."""
@@ -59,8 +59,9 @@ class Checked:
         if hand["type"] == "arm" and F.any():
             brought += [
                 {"from": f"hand.F[{i}]", "to": f"{end}[{i}]", "offset": F[i - 1]}
-                for end in self.ends("hand.F")
+                for start, end in self.connections
                 for i in (1, 2, 3)
+                if start == "hand.F"
             ]
             F = np.zeros(3)
         options = {k: v for k, v in self.options.items() if k.partition(".")[0] != "hand"}
@@ -78,38 +79,27 @@ class Checked:
             "stop_when": "",
         }
 
-    def step(self, told: float, changes: Mapping[str, Any]) -> float:
+    def step(self, told: float, changes: Row) -> float:
         """The hyperperiod (s), or about a frame where motions change much over it."""
-        fast = Fraction(str(changes.get("haptics.rate", self.haptic)))
-        slow = Fraction(str(changes.get("graphics.rate", self.graphics)))
+        fast, slow = self.haptic, Fraction(str(changes.get("graphics.rate", self.graphics)))
         whole = math.gcd(fast.numerator * slow.denominator, slow.numerator * fast.denominator)
         period = Fraction(fast.denominator * slow.denominator, whole)
         return float(period if abs(told) * period < 0.5 else round(fast / slow) / fast)
 
-    def run(
-        self,
-        pose: str,
-        hand: Mapping[str, Any],
-        told: float,
-        changes: Mapping[str, Any],
-        again: int,
-    ) -> tuple[Growth, Any]:
+    def run(self, pose: str, hand: Row, told: float, changes: Row, again: int) -> Ended:
         """The growth rate of a run in a pose and a hand; `told` is how fast it may be."""
         step = self.step(told, changes)
-        small, folds = (
-            (1e-15 if told > 5.0 else 1e-12 if told > 1.0 else 1e-9, 20.0)
-            if told > 0.0
-            else (5e-7, 20.0)
-        )
+        rises = 1e-15 if told > 5.0 else 1e-12 if told > 1.0 else 1e-9
+        small, folds = (rises, 20.0) if told > 0.0 else (5e-7, 30.0)  # until its rest creeps alone
         seconds = min(LONGEST[again], max((1 + again) * folds / max(abs(told), 1e-3), 30 * step))
-        options = self.at_rest(pose, hand, small * NUDGES[again]) | dict(changes)
+        options = self.at_rest(pose, hand, small * NUDGES[again]) | changes
         if len(options["connection"]) > 1:  # the hand's connections are one for each scalar
-            delays = dict(options.get("delays", {}))
-            for key in [key for key in delays if key.startswith("hand.F ->")]:
-                ends = [f"{end}[{i}]" for end in key.split(" -> ") for i in (1, 2, 3)]
-                late = delays.pop(key)
-                delays |= {f"{a} -> {b}": late for a, b in zip(ends[:3], ends[3:], strict=True)}
-            options["delays"] = delays
+            each = [(" ->", f"[{i}] ->", f"[{i}]") for i in (1, 2, 3)]
+            options["delays"] = {
+                key.replace(old, new) + end: late
+                for key, late in options.get("delays", {}).items()
+                for old, new, end in (each if key.startswith("hand.F ->") else [("", "", "")])
+            }
         try:
             run = hl.run(self.base, options | {"duration": max(seconds, 0.25)}, figures=False)
         except hl.InputFault as fault:
@@ -119,8 +109,7 @@ class Checked:
 
 def _table(hand: Mapping[str, Any], place: Any, F: Any, nudge: Any) -> Row:
     """The [hand] table that stands still at a pose, nudged, and presses with F."""
-    left_out = "interpolation", "timing"
-    table = {k: v for k, v in hand.items() if v is not None and k not in left_out}
+    table = {k: v for k, v in hand.items() if v is not None and k not in LEFT_OUT}
     if table["type"] in ("constant", "profile"):
         off = F + nudge * np.array([100.0, 100.0, 0.2])
         damped = {"damping": table["damping"]} if table.get("damping") else {}
@@ -152,22 +141,12 @@ def compare(case: Mapping[str, Any], run: Growth) -> tuple[str, str]:
 
 def claims(scene: Checked) -> Iterator[Row]:
     """All printed numbers, with what runs say of them."""
-    yield from _energies(scene)
-    if scene.varies:
-        yield _exponent(scene)
-        return
-    for hand in dict.fromkeys(c["hand"] for c in scene.record["cases"]):
-        yield _rate(scene, max((c for c in scene.record["cases"] if c["hand"] == hand), key=_rank))
-    yield from _damping(scene)
-    yield from _margins(scene)
-    yield from _remedies(scene)
+    kinds = (_exponent,) if scene.varies else (_rates, _damping, _margins, _remedies)
+    for kind in (_energies, *kinds):
+        yield from (dict(zip(COLUMNS, claim, strict=True)) for claim in kind(scene))
 
 
-def _row(what: str, told: float, says: str, why: str) -> Row:
-    return {"what": what, "told": told, "says": says, "why": why}
-
-
-def _energies(scene: Checked) -> Iterator[Row]:
+def _energies(scene: Checked) -> Iterator[Claim]:
     """What the hand of the scene's own run put in, and what was generated at its port, (J), by sums
     over rows: each force is held over a step."""
     told = scene.own.run["user_port"]
@@ -184,10 +163,10 @@ def _energies(scene: Checked) -> Iterator[Row]:
         ("most energy generated (J)", told["peak"], generated.max()),
     ):
         near = abs(J - by_rows) <= 1e-9 + 1e-6 * max(np.abs(put_in).max(), np.ptp(E))
-        yield _row(what, J, "agree" if near else "contradicted", f"rows {by_rows:.6g} J")
+        yield what, J, "agree" if near else "contradicted", f"rows {by_rows:.6g} J"
 
 
-def _exponent(scene: Checked) -> Row:
+def _exponent(scene: Checked) -> Iterator[Claim]:
     """The Lyapunov exponent of a rate that varies, by the slope of the logarithm of what moves."""
     told, wide = scene.record["lyapunov_exponent"], 3 * scene.record["confidence"]
     row = "Lyapunov exponent (1/s)", told
@@ -197,14 +176,13 @@ def _exponent(scene: Checked) -> Row:
     size = np.array([d[i : i + n].max() for i in range(0, len(d) - n, n)])
     moving = np.flatnonzero((size < 1e-6) & (size > 1e-13))
     if len(moving) < 16:
-        return _row(*row, "undecided", "less than 4 s between rounding and large motions")
+        yield *row, "undecided", "less than 4 s between rounding and large motions"
+        return
     slope = float(np.polyfit(moving / 4, np.log(size[moving]), 1)[0])
     off = abs(slope - told)
-    far = off > max(3 * wide, 0.3 * abs(told))
-    near = off < max(wide, 0.1 * abs(told))
-    return _row(
-        *row, "agree" if near else "contradicted" if far else "undecided", f"run {slope:.4g}"
-    )
+    far, near = off > max(3 * wide, 0.3 * abs(told)), off < max(wide, 0.1 * abs(told))
+    says = "agree" if near else "contradicted" if far else "undecided"
+    yield *row, says, f"run {slope:.4g}"
 
 
 def _rank(case: Mapping[str, Any]) -> tuple[bool, bool, bool, float]:
@@ -213,30 +191,37 @@ def _rank(case: Mapping[str, Any]) -> tuple[bool, bool, bool, float]:
     return fast, grows, case["verdict"] == "marginal", case["growth_rate"]
 
 
-def _rate(scene: Checked, case: Mapping[str, Any]) -> Row:
+def _rates(scene: Checked) -> Iterator[Claim]:
+    """Of each hand, in its worst pose."""
+    cases = scene.record["cases"]
+    for hand in dict.fromkeys(c["hand"] for c in cases):
+        yield _rate(scene, max((c for c in cases if c["hand"] == hand), key=_rank))
+
+
+def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
     """The growth rate of a hand. A run that shows less than was told may leave out a mode: a second
     one begins otherwise, and is longer."""
     told, hand = case["growth_rate"], scene.record["hands"][case["hand"]]
     step = scene.step(told, {})
     row = f"{case['hand']} at {case['pose']} (1/s)", told
     if case["saturated"]:
-        return _row(*row, "undecided", "motors at their limit, which any motion takes them off")
+        return *row, "undecided", "motors at their limit, which any motion takes them off"
     if abs(told) * step > 1.0 and (scene.haptic / scene.graphics).denominator > 1:
-        return _row(*row, "undecided", "too fast for frames of different lengths")
+        return *row, "undecided", "too fast for frames of different lengths"
     for again in (0, 1):
         run, _ = scene.run(case["pose"], hand, told, {}, again)
         says, why = compare(case, run)
         if says == "agree" or (says == "contradicted" and run.rate > told):
             break
-    return _row(*row, says, why)
+    return *row, says, why
 
 
-def _grows(
-    scene: Checked, pose: str, hand: str, changes: Mapping[str, Any], slow: float = 0.0
-) -> bool | None:
-    """Whether more than a drift, and than twice `slow`, grows; None where that is not clean."""
+def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
+    """Whether in the pose and hand of a case more than a drift, and than twice what is marginal
+    there, grows; None where that is not clean."""
+    hand, slow = scene.record["hands"][case["hand"]], case["growth_rate"]
     for again in (0, 1):
-        run, ended = scene.run(pose, scene.record["hands"][hand], 1.0 - 0.9 * again, changes, again)
+        run, ended = scene.run(case["pose"], hand, 1.0 - 0.9 * again, changes, again)
         if ended is None:
             return None
         if ended.fault:
@@ -245,7 +230,8 @@ def _grows(
         if size.max() > FAR and not again:
             return True
         if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
-            return run.rate > max(SLIGHT, 2.2 * slow) and not run.drifts
+            least = 2.2 * slow if case["verdict"] == "marginal" else 0.0
+            return run.rate > max(SLIGHT, least) and not run.drifts
         early, late = (float(part.max()) for part in np.array_split(size, 8)[::7])
         if late > 100 * early:
             return True
@@ -254,51 +240,45 @@ def _grows(
     return None
 
 
-def _in_hands(scene: Checked, changes: Mapping[str, Any], most: int) -> tuple[bool | None, str]:
+def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str]:
     """Whether something grows in the worst pose in some of at most so many hands with changes."""
-    worst, clean = scene.record["worst"], True
-    cases = {c["hand"]: c for c in scene.record["cases"] if c["pose"] == worst["pose"]}
-    names = sorted((h for h in cases if h not in OWN), key=lambda h: -cases[h]["growth_rate"])
-    for hand in names[:most]:
-        slow = cases[hand]["growth_rate"] if cases[hand]["verdict"] == "marginal" else 0.0
-        grows = _grows(scene, worst["pose"], hand, changes, slow)
-        if grows:
-            return True, f"{hand} grows"
+    pose, clean = scene.record["worst"]["pose"], True
+    cases = [c for c in scene.record["cases"] if c["pose"] == pose and c["hand"] not in OWN]
+    for case in sorted(cases, key=lambda c: -c["growth_rate"])[:most]:
+        if grows := _grows(scene, case, changes):
+            return True, f"{case['hand']} grows"
         clean = clean and grows is False
     return (False, "none grows") if clean else (None, "not clean in some hand")
 
 
-def _damping(scene: Checked) -> Iterator[Row]:
+def _damping(scene: Checked) -> Iterator[Claim]:
     """The damping with which small motions of a free handle decay at .1 1/s, and half of it."""
-    for case in scene.record["cases"]:
-        b = case["damping_needed"]
-        if b is None or b != scene.record["damping_needed_in_free_air"] or not math.isfinite(b):
-            continue
-        rates = []
-        for damping in (b, b / 2):
-            hand = {"type": "constant", "damping": [damping, damping, 1e-3 * damping]}
-            rates.append(scene.run(case["pose"], hand, -0.1, {}, 0)[0])
+    b = scene.record["damping_needed_in_free_air"]
+    poses = [
+        c["pose"]
+        for c in scene.record["cases"]
+        if b is not None and c["damping_needed"] == b < math.inf
+    ]
+    for pose in poses[:1]:
+        hands = [{"type": "constant", "damping": [d, d, 1e-3 * d]} for d in (b, b / 2)]
+        rates = [scene.run(pose, hand, -0.1, {}, 0)[0] for hand in hands]
         says = "agree" if rates[0].rate < -0.09 and rates[1].rate > -0.11 else "contradicted"
         if any(r.why or r.spread > 0.01 for r in rates):
             says = "undecided"
         why = ", ".join(r.why or f"{r.rate:.3g}" for r in rates)
-        yield _row(f"damping in free air at {case['pose']} (N.s/m)", b, says, f"runs {why}")
-        return
+        yield f"damping in free air at {pose} (N.s/m)", b, says, f"runs {why}"
 
 
-def _margins(scene: Checked) -> Iterator[Row]:
+def _margins(scene: Checked) -> Iterator[Claim]:
     margin, options, haptic = scene.record["margin"], scene.options, float(scene.haptic)
-    pairs = (c.split(" -> ") for c in scene.own.run["connections"])
-    reads = [" -> ".join(p) for p in pairs if p[1].startswith("controller")]
+    reads = [" -> ".join(c) for c in scene.connections if c[1].startswith("controller")]
 
     def scaled(s: float) -> Row:
-        found: Row = {}
-        for key, by in (("stiffness", s), ("damping", s**0.5)):
-            name = f"controller.teleoperation.{key}"
-            found[name] = [gain * by for gain in options[name]]
-        if options["controller.topology"]:
-            found["controller.topology"] = {"stiffness": 200.0 * s, "damping": 50.0 * s**0.5}
-        return found
+        by = {"stiffness": s, "damping": s**0.5}
+        names = {f"controller.teleoperation.{key}": factor for key, factor in by.items()}
+        found: Row = {n: [gain * factor for gain in options[n]] for n, factor in names.items()}
+        topology = {"stiffness": 200.0 * s, "damping": 50.0 * s**0.5}
+        return found | ({"controller.topology": topology} if options["controller.topology"] else {})
 
     def later(n: float) -> Row:
         given = {str(k): float(v) for k, v in options.get("delays", {}).items()}
@@ -322,35 +302,23 @@ def _margins(scene: Checked) -> Iterator[Row]:
         if (below[0], above[0]) == (False, True):
             says = "agree"
         why = f"at {inside:.4g}: {below[1]}; at {outside:.4g}: {above[1]}"
-        yield _row(f"margin of {name}", told, says, why)
+        yield f"margin of {name}", told, says, why
 
 
-def _remedies(scene: Checked) -> Iterator[Row]:
+def _remedies(scene: Checked) -> Iterator[Claim]:
     """Each by the scene with its options, of which a run is to show the rate that it is told."""
     for remedy in scene.record["remedies"]:
         told, what = remedy["growth"], f"remedy {' '.join(remedy['options'])} (1/s)"
         try:
-            there = Checked(scene.base, scene.options | dict(map(_value, remedy["options"])))
+            given = {".".join(names): value for names, value in map(parse, remedy["options"])}
+            there = Checked(scene.base, scene.options | given)
         except (hl.InputFault, hl.Fault) as fault:
-            yield _row(what, told, "contradicted", str(fault).splitlines()[0])
+            yield what, told, "contradicted", str(fault).splitlines()[0]
             continue
-        held = [
-            c
-            for c in there.record["cases"]
-            if c["hand"] not in OWN
-            and c["verdict"] != "marginal"
-            and (c["verdict"], c["kind"]) != ("unstable", "drift")
-        ]
-        row = _rate(there, max(held, key=_rank))
+        told_of = [c for c in there.record["cases"] if c["hand"] not in OWN]
+        fast = [c for c in told_of if c["verdict"] == "stable" or _rank(c)[0]]
+        of, _, says, why = _rate(there, max(fast, key=_rank))
         limit = told + max(CLOSE * abs(told), LEAST) if math.isfinite(told) else SLIGHT
-        if (fast := max(c["growth_rate"] for c in held)) > limit:
-            row |= {"says": "contradicted", "why": f"with these options {fast:.4g} is told"}
-        yield row | {"what": f"{what}: {row['what']}", "told": told}
-
-
-def _value(option: str) -> tuple[str, Any]:
-    key, _, text = option.partition("=")
-    try:
-        return key, tomllib.loads(f"v = {text}")["v"]
-    except tomllib.TOMLDecodeError:
-        return key, text
+        if (most := max(c["growth_rate"] for c in fast)) > limit:
+            says, why = "contradicted", f"with these options {most:.4g} is told"
+        yield f"{what}: {of}", told, says, why

@@ -17,19 +17,26 @@ class Motion:
     """The rows of a run of which two modes move handle and mechanism, and an even creep (m/s)."""
 
     def __init__(
-        self, rate: float, hertz: float, size: float, seconds: float, creep: float = 0.0
+        self,
+        rate: float,
+        hertz: float,
+        size: float,
+        seconds: float,
+        creep: float = 0.0,
+        faint: tuple[float, float] = (0.0, 0.0),
     ) -> None:
         self.t = np.arange(round(seconds * RATE)) / RATE
         turning = np.cos(2 * np.pi * hertz * self.t + 0.3)
         fast = 5.0 * np.exp(-9.0 * self.t)
         self.x = 0.05 + size * (np.exp(rate * self.t) * turning + fast) + creep * self.t
+        self.faint = faint[0] * size * np.exp(faint[1] * self.t)
 
     def time(self, name: str) -> Any:
         return self.t
 
     def __getitem__(self, name: str) -> Any:
         weights = np.linspace(1.0, 2.0, 3) + list(SCALES).index(name)
-        return self.x[:, None] * weights
+        return self.x[:, None] * weights + self.faint[:, None] * [1.0, -1.0, 0.5]
 
 
 @pytest.mark.parametrize(
@@ -51,6 +58,24 @@ def test_growth_and_decay_are_those_of_the_slowest_mode(
 def test_what_creeps_on_evenly_hides_no_mode() -> None:
     found = growth_of(Motion(-2.0, 0.0, 3e-7, 20.0, creep=1e-9), P, -2.0)
     assert found.rate == pytest.approx(-2.0, abs=0.01)
+
+
+@pytest.mark.parametrize("creep", [7e-11, 2e-12])
+def test_what_decays_least_is_found_where_it_is_still_faint(creep: float) -> None:
+    told = {"growth_rate": -1.8, "frequency": 0.0, "uncertainty": 0.0}
+    found = growth_of(Motion(-2.0, 1.6, 4e-7, 14.0, creep, faint=(0.01, -1.8)), P, -1.8)
+    assert compare(told, found)[0] == "agree"
+    assert compare(told | {"growth_rate": -2.0}, found)[0] == "contradicted"
+
+
+def test_a_slow_decay_is_no_creep() -> None:
+    assert growth_of(Motion(-0.02, 0.0, 3e-7, 60.0), P, -0.02).rate == pytest.approx(
+        -0.02, rel=0.01
+    )
+
+
+def test_a_run_that_is_too_short_decides_nothing() -> None:
+    assert "0 periods" in growth_of(Motion(-2.0, 0.0, 3e-7, 0.05), P, -2.0).why
 
 
 def test_what_is_not_clean_decides_nothing() -> None:
