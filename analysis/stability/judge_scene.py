@@ -105,11 +105,11 @@ def stability(
     if grid and read.linkage.dimension > 2:
         raise InputFault("places on a grid are of the plane: leave out --grid of a scene in space")
     hands = hands_of(read.hand, read.space)
-    read, rounded = short(with_quicker_fmus(read))
+    read = with_quicker_fmus(read)
     with interrupt.defer_signals(), process_cache.keep_unpacked(), prefer_compiled():
         steps = Steps(progress, 1)
         steps.begin("the scene's own run")
-        own, own_run = _visit_poses(read, poses, grid)
+        own, own_run = _visit_poses(short(read)[0], poses, grid)
         own_fault = fault_of(own_run)
 
         def visits(changed: Scene) -> tuple[list[Pose], str]:
@@ -121,7 +121,7 @@ def stability(
             return found, broken_limit(changed, run)
 
         work = SharedWork(run=lambda: own_run)
-        judged = _judge(read, visits, hands, bounds, steps, rounded, work)
+        judged = _judge(read, visits, hands, bounds, steps, work)
     return replace(judged, run_fault=own_fault)
 
 
@@ -183,12 +183,12 @@ def _judge_at_rest(read: Scene, bounds: Bounds, progress: Progress | None) -> St
     hands: Hands = {UNHELD: None}
     if read.hand is not None and not is_hand_replaced(read):
         hands = {OWN: linearise_hand(read.hand)}
-    read, rounded = short(with_quicker_fmus(read))
+    read = with_quicker_fmus(read)
     steps = Steps(progress, 1)
     steps.begin("the run until it rests")
     try:
-        work = SharedWork(run=lambda: simulate_for(SPAN, read))
-        return _judge(read, _at_rest, hands, bounds, steps, rounded, work)
+        work = SharedWork(run=lambda: simulate_for(SPAN, short(read)[0]))
+        return _judge(read, _at_rest, hands, bounds, steps, work)
     except InputFault as fault:
         if read.hand or read.device or read.controller or read.fmu:
             raise
@@ -203,7 +203,7 @@ def _at_rest(read: Scene) -> tuple[list[Pose], str]:
     if read.linkage is None:
         raise InputFault("no linkage: nothing that comes to rest in a pose")
     with interrupt.defer_signals():
-        return [rest(read, read.linkage)], ""
+        return [rest(short(read)[0], read.linkage)], ""
 
 
 def _judge(
@@ -212,23 +212,23 @@ def _judge(
     hands: Hands,
     bounds: Bounds,
     steps: Steps,
-    rounded: str,
     work: SharedWork,
 ) -> Stability:
     """The verdict in the poses of `visits`, which are found again for a remedy."""
     visited, _ = visits(read)
+    short_read, rounded = short(read)
     named = {pose.name: pose for pose in visited}
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
         cases, without = in_poses(
-            read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
+            short_read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
         )
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            if named[worst.pose].leaves(read, hands[worst.hand]):
+            if named[worst.pose].leaves(short_read, hands[worst.hand]):
                 break
             cases[cases.index(worst)] = replace(worst, verdict="marginal")
             worst = worst_case(cases)
@@ -240,7 +240,7 @@ def _judge(
         margin, remedies = improvements(
             read, named[worst.pose], held, bounds, worst, visits, hardest, work, steps
         )
-        with linearisable(read) as (_, system, removed):
+        with linearisable(short_read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))
     return Stability(
         title=read.title,

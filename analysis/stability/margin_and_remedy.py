@@ -1,7 +1,6 @@
 """How far the worst case is from the limit, and what takes an unstable one to the safe side.
 
-Both are searched in one pose and all hands, and what is advised is judged in all poses before; with
-frames of whole haptic periods next to the scene's, whose map is short.
+Both are searched in one pose and all hands, and what is advised is judged in all poses before.
 A mode that only drifts counts as stable.
 """
 
@@ -33,7 +32,7 @@ from hapticlink.analysis.stability.remedy_trial import (
 )
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.shared_work import SharedWork
-from hapticlink.analysis.stability.short_hyperperiod import frame_length, short, whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import frame_length, graphics_rate, short
 from hapticlink.analysis.stability.told_steps import Steps
 from hapticlink.components.specs.hand import Hand
 from hapticlink.orchestrator import open_scene
@@ -126,8 +125,8 @@ class _Search:
     def place(
         self, change: Sequence[str] = ()
     ) -> AbstractContextManager[tuple[RestingScene, Pose]]:
-        """The scene at rest in the pose; with a change, in frames of whole haptic periods."""
-        read = whole_frames(open_scene.load(self._read, change)) if change else self._read
+        """The scene, with a change, at rest in the pose."""
+        read = short(open_scene.load(self._read, change) if change else self._read)[0]
         return at_pose(read, self._pose, self._hands.keys() != {UNHELD}, work=self._work)
 
     def margin(self, place: RestingScene) -> Margin:
@@ -171,10 +170,8 @@ class _Search:
         its own rate, where that is stable: it need not be a whole number of periods."""
         if not periods:
             return float("inf")
-        own = self._read.graphics.rate if self._read.graphics else None
-        if stable and periods == frame_length(self._read) and isinstance(own, int | float | str):
-            return float(exact(own))
-        return float(self._haptic / periods)
+        own = stable and periods == frame_length(self._read)
+        return float(graphics_rate(self._read) if own else self._haptic / periods)
 
     def _slowest_frame(self, stable: bool) -> Largest:
         """The longest frame, in haptic periods, that is stable, searched from the scene's own on,
@@ -254,8 +251,7 @@ class _Search:
             if damping:
                 yield tuple(overrides.write_options(damping))
         if read.graphics is not None:
-            assert isinstance(read.graphics.rate, int | float | str)  # see `whole_frames`
-            rate = exact(read.graphics.rate)
+            rate = graphics_rate(read)
             if (whole := self._haptic / frame_length(read)) != rate:
                 yield (set_rate("graphics", whole),)
             if margin.rate is not None and margin.rate > rate:
