@@ -49,7 +49,7 @@ from hapticlink.analysis.stability.port_response import (
     response,
 )
 from hapticlink.analysis.stability.poses import in_own_hand
-from hapticlink.analysis.stability.short_hyperperiod import frame_length, round_rate
+from hapticlink.analysis.stability.short_hyperperiod import in_periods
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
 from hapticlink.analysis.stability.two_port import ROUNDING, TwoPort, between, mixes
@@ -140,12 +140,12 @@ def passivity(scene: str | Path | Scene, options: Options = ()) -> Passivity:
     several users it is the first one's port, with the others in the hands of the scene.
 
     Raises InputFault for a scene without equilibrium in its own hand, one whose hand pushes no
-    device, or with a hyperperiod of more than 600 forces with frames of whole haptic periods, too.
+    device, or with a hyperperiod of more than 600 forces with a frame in it alone, too.
     """
     read, said = open_scene.load(scene, options), ""
     hand, mechanism, count = _ports(read)
     if count > LARGEST and read.graphics is not None:
-        read, said = round_rate(read, exact(read.haptics.rate) / frame_length(read))
+        read, said = in_periods(read)
         hand, mechanism, count = _ports(read)
     if count > LARGEST:
         higher = write_exact(exact(read.haptics.rate) / 16)

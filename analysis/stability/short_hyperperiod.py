@@ -22,16 +22,25 @@ ROUNDED = 250
 
 def short(read: Scene) -> tuple[Scene, str]:
     """The scene as it is judged, and which rate is rounded in it: where its events repeat only
-    after more than EVENTS, as of 29.97 and 512 Hz after 100 s, as many frames to ROUNDED periods or
-    fewer as come next to its rate. Raises InputFault for a rate that varies.
+    after more than EVENTS, as of 29.97 and 512 Hz after 100 s, as `in_periods` of ROUNDED has it.
+    Raises InputFault for a rate that varies."""
+    haptic = exact(read.haptics.rate)
+    if read.graphics is None or repetition(read) * float(haptic) <= EVENTS:
+        return read, ""
+    return in_periods(read, ROUNDED)
+
+
+def in_periods(read: Scene, most: int = 1) -> tuple[Scene, str]:
+    """The scene with as many frames in a number of haptic periods, at most `most` or those of a
+    frame, as come next to its rate, and a sentence that says so. Raises InputFault for a rate that
+    varies.
 
     A frame that ends between two haptic ticks is seen at the later one, and one that ends on a tick
     at once, which of the scene's own frames hardly any does. So these end half of the distance
     beside ticks that others keep, unless the scene has a phase or FMUs that may refuse one."""
     haptic = exact(read.haptics.rate)
-    if read.graphics is None or repetition(read) * float(haptic) <= EVENTS:
-        return read, ""
-    share = (graphics_rate(read) / haptic).limit_denominator(max(ROUNDED, frame_length(read)))
+    assert read.graphics is not None
+    share = (graphics_rate(read) / haptic).limit_denominator(max(most, frame_length(read)))
     first = (1 / share - Fraction(1, 2 * share.numerator)) / haptic
     late = [f"graphics.phase={write_exact(first)}"]
     return round_rate(read, share * haptic, [] if read.graphics.phase or read.fmu else late)
