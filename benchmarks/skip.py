@@ -9,10 +9,10 @@ set      inputs of the project's FMUs that have not changed are not set again
 request  FMUs leave out costly outputs while nobody reads them (`Variable.on_request`)
 
 Operations are those that the FMUs' steps have executed, calls those of FMI functions that the
-loop has made, values what they set or fetch: all repeat exactly. Run times are those of native FMUs
-in interleaved rounds, in which only the signals are recorded that connections read. "The same"
-compares every number that the scene as it is has in its tables, all outputs recorded, with that of
-the run with nothing skipped.
+loop has made, values what they set or fetch: all repeat exactly. Run times are processor times of
+the loop with native FMUs, in interleaved rounds in which only the signals are recorded that
+connections read. "The same" compares every number that the scene as it is has in its tables, all
+outputs recorded, with that of the run with nothing skipped.
 """
 
 from __future__ import annotations
@@ -30,12 +30,13 @@ import hapticlink.scenes
 from benchmarks import code_version
 from benchmarks.page import Progress
 from benchmarks.rows import Rows
+from benchmarks.timing import simulated
 from hapticlink.analysis.findings import block_costs
 from hapticlink.fmus.cost import Cost
 from hapticlink.fmus.fmu_functions import RARELY
 from hapticlink.orchestrator import experiment
 from hapticlink.orchestrator.base import temporary_folders
-from hapticlink.orchestrator.experiment import Experiment, simulate
+from hapticlink.orchestrator.experiment import Experiment
 from hapticlink.orchestrator.fmi import calls_of_fmi, process_cache
 from hapticlink.orchestrator.fmi.setter import Setter
 from hapticlink.orchestrator.fmi.variables import entry_of
@@ -73,7 +74,7 @@ def nothing_skipped() -> Iterator[None]:
 def run(scene: str, folder: Path, skipping: str, *options: str) -> Experiment:
     """The scene with native FMUs, skipping ON or OFF."""
     with nothing_skipped() if skipping == OFF else nullcontext():
-        return simulate(scene, folder, ["packaging=native", *options], csv=False)
+        return simulated(scene, folder, ["packaging=native", *options], csv=False)
 
 
 def counts(made: Experiment, skipping: str) -> tuple[int, int, int]:

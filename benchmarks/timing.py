@@ -4,10 +4,12 @@ all forms by turns."""
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from time import process_time
 from typing import Any
+from unittest.mock import patch
 
 from benchmarks.page import Progress
 from benchmarks.rows import Rows
@@ -53,21 +55,23 @@ def simulated(
     csv: bool = True,
     clock: Callable[[], float] = process_time,
 ) -> Experiment:
-    """A run whose `outcome.wall_time` is the time of its loop by `clock`."""
-    before, execute_plan.perf_counter = execute_plan.perf_counter, clock
-    try:
+    """A run without fault whose `outcome.wall_time` is the time of its loop by `clock`."""
+    with loop_timed_by(clock):
         made = simulate(scene, folder, options, csv=csv)
-    finally:
-        execute_plan.perf_counter = before
     assert made.outcome.fault is None, made.outcome.fault
     return made
+
+
+@contextmanager
+def loop_timed_by(clock: Callable[[], float] = process_time) -> Iterator[None]:
+    """Within, `outcome.wall_time` of a run is the time of its loop by `clock`."""
+    with patch.object(execute_plan, "perf_counter", clock):
+        yield
 
 
 def made_anew(make: Callable[[], object], cache: Path) -> float:
     """Processor time (s) of this process and its children to make something with the empty cache of
     FMUs `cache`."""
-    from unittest.mock import patch
-
     from hapticlink.orchestrator.run.compiled.library import load
 
     load()  # is compiled once

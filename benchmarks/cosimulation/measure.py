@@ -13,6 +13,7 @@ from benchmarks.continuous import GRID, Reference
 from benchmarks.cosimulation.points import NONE, Point
 from benchmarks.page import Progress
 from benchmarks.rows import Rows, quartiles
+from benchmarks.timing import loop_timed_by
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.experiment import simulate
@@ -41,7 +42,8 @@ def run(point: Point, reference: np.ndarray, folder: Path, duration: float | Non
     """The row of a point from `run_s` on; a refused one has no numbers."""
     options = point.options + ([f"duration={duration!r}"] if duration else [])
     try:
-        made = simulate(point.scene, folder, options, csv=False)
+        with loop_timed_by():
+            made = simulate(point.scene, folder, options, csv=False)
     except InputFault:
         return ["", "", "", "", REFUSED, ""]
     outcome = made.outcome

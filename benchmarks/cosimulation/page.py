@@ -75,8 +75,8 @@ def _how(
         "[reference.csv](reference.csv)."
     )
     time = (
-        "Run time: native FMUs under the compiled loop, only the handle recorded, without "
-        "start-up; median and quartiles of interleaved rounds, comparable within one run of the "
+        "Run time: processor time of the compiled loop with native FMUs, only the handle recorded, "
+        "without start-up; median and quartiles of interleaved rounds, comparable within one run of the "
         "benchmark. A run is unstable if it ends early, or if its handle is a link's length "
         f"({APART:g} mm) from the reference; unstable points stay, marked. Repetitions of "
         "`iterated` run in Python: their run time is that of Python. All points: "
