@@ -49,14 +49,16 @@ def page(out: Path, rows: Rows, same: Rows, command: str) -> str:
         "",
         "![Operations and run time without skipping, over those with it](skip.png)",
         "",
-        f"Made by `{command}`. Each shipped scene runs with native FMUs as it is, and with nothing "
-        "skipped: all blocks, all optional outputs and all pairs of contacts are built into FMUs, "
-        "every output is fetched at each communication point, and every input is set whether it "
-        "has changed or not. Operations (executed in all steps of the FMUs), FMI calls (set, step, "
-        "get) and values moved by them repeat exactly; run time, the processor time of the loop, is "
-        "the median of the ratios of interleaved rounds, with quartiles, recording what connections read. The same: how many "
-        "of the numbers that the scene has in its tables, all outputs recorded, are equal to the "
-        "last bit. All rows: [runs.csv](runs.csv), [same.csv](same.csv).",
+        f"Made by `{command}`. "
+        "Each shipped scene runs with native FMUs as it is, and with nothing skipped: all "
+        "blocks, all optional outputs and all pairs of contacts are built into FMUs, every "
+        "output is fetched at each communication point, and every input is set whether it has "
+        "changed or not. Operations (executed in all steps of the FMUs), FMI calls (set, step, "
+        "get) and values moved by them repeat exactly; run time, the processor time of the "
+        "loop, is the median of the ratios of interleaved rounds, with quartiles, recording "
+        "what connections read. The same: how many of the numbers that the scene has in its "
+        "tables, all outputs recorded, are equal to the last bit. All rows: "
+        "[runs.csv](runs.csv), [same.csv](same.csv).",
         "",
         *table(heads, "lrrrrrrrl", cells),
         "",

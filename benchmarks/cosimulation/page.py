@@ -75,9 +75,10 @@ def _how(
         "[reference.csv](reference.csv)."
     )
     time = (
-        "Run time: processor time of the compiled loop with native FMUs, only the handle recorded, "
-        "without start-up; median and quartiles of interleaved rounds, comparable within one run of the "
-        "benchmark. A run is unstable if it ends early, or if its handle is a link's length "
+        "Run time: processor time of the compiled loop with native FMUs, only the handle "
+        "recorded, without start-up; median and quartiles of interleaved rounds, comparable "
+        "within one run of the benchmark. A run is unstable if it ends early, or if its handle "
+        "is a link's length "
         f"({APART:g} mm) from the reference; unstable points stay, marked. Repetitions of "
         "`iterated` run in Python: their run time is that of Python. All points: "
         "[table.csv](table.csv), all runs: [runs.csv](runs.csv)."
