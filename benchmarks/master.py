@@ -70,13 +70,18 @@ def measured(master: str, folder: Path) -> tuple[float, float, float]:
 
 def alone(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of the loop in C."""
-    return bare_loop.seconds(SCENE, options, RATE * seconds, folder)
+    return bare_loop.seconds(SCENE, _lasting(options, seconds), RATE * seconds, folder)
 
 
 def recorded(options: list[str], folder: Path, seconds: int) -> float:
     """Processor time (s) of our loop."""
-    given = [*options, f"duration={seconds}"]
+    given = _lasting(options, seconds)
     return simulated(SCENE, folder / "out", given, clock=thread_time).outcome.wall_time
+
+
+def _lasting(options: list[str], seconds: int) -> list[str]:
+    """FMUs refuse steps beyond the duration of their scene."""
+    return [*options, f"duration={seconds}"]
 
 
 def ticks(rows: Rows, rounds: int, folder: Path) -> None:
