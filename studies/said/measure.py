@@ -212,18 +212,24 @@ def _rates(scene: Checked) -> Iterator[Claim]:
 def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
     """The growth rate of a hand. A run that shows more than was told may show a creep by the square
     of its nudge (Odd); one that shows less may leave out a mode: a last one begins otherwise, and
-    is longer. Frames of different lengths contradict nothing (step_of)."""
+    is longer. Frames of different lengths contradict nothing (FOLDS), but agree where there are too
+    few hyperperiods: of -1.861 1/s, whose hyperperiod is 1 s, seed 4900623 shows -2.03 +- .16 by
+    these, and -1.8608 by frames."""
     told, hand = case["growth_rate"], scene.record["hands"][case["hand"]]
     step = scene.step(told, {})
     row = f"{case['hand']} at {case['pose']} (1/s)", told
     if case["saturated"]:
         return *row, "undecided", "motors at their limit, which any motion takes them off"
     whole = step == hyperperiod(scene.haptic, scene.graphics)
+    frame = step_of(scene.haptic, scene.graphics, math.inf)
     if abs(told) * step > 1.0 and not whole:
         return *row, "undecided", "too fast for frames of different lengths"
     for again in range(len(NUDGES)):
-        run, _ = scene.run(case["pose"], hand, told, {}, again)
+        run, seen = scene.run(case["pose"], hand, told, {}, again)
         says, why = compare(case, run)
+        if says != "agree" and seen is not None and frame != step and abs(told) * frame < 1.0:
+            by_frames = compare(case, growth_of(seen, frame, told))
+            says, why = by_frames if by_frames[0] == "agree" else (says, why)
         if says == "agree" or (again and says == "contradicted" and run.rate > told):
             break
     if says == "contradicted" and not whole:

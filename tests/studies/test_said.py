@@ -119,3 +119,27 @@ def test_frames_of_different_lengths_contradict_nothing(graphics: int, says: str
         run=lambda *_: (Growth(22.0, 0.8, 0.0, 0.03), None),
     )
     assert _rate(scene, case | {"hand": "firm grip", "pose": "0 s"})[2] == says
+
+
+def test_a_decay_ends_above_what_is_rounded() -> None:
+    told = {"growth_rate": -0.436, "frequency": 0.25, "uncertainty": 0.0}
+    for seed in range(8):
+        motion = Motion(-0.436, 0.25, 3e-6, 50.0)
+        motion.x += 1e-15 * np.random.Generator(np.random.PCG64(seed)).standard_normal(
+            len(motion.t)
+        )
+        assert compare(told, growth_of(motion, 1.0, -0.436))[0] == "agree"
+
+
+def test_frames_agree_where_hyperperiods_are_too_few() -> None:
+    motion = Motion(-1.86, 0.0, 3e-7, 8.0)
+    scene: Any = SimpleNamespace(
+        record={"hands": {"firm grip": {}}},
+        haptic=Fraction(RATE),
+        graphics=Fraction(33),
+        step=lambda *_: 1.0,
+        run=lambda *_: (Growth(-2.03, 0.16, 0.0, 1.0), motion),
+    )
+    case = {"frequency": 0.0, "uncertainty": 0.0, "saturated": False, "hand": "firm grip"}
+    for told, says in ((-1.86, "agree"), (-1.7, "undecided")):
+        assert _rate(scene, case | {"growth_rate": told, "pose": "0 s"})[2] == says
