@@ -225,7 +225,7 @@ def _judge(
         )
         if not cases:
             name, why = next(iter(without.items()))
-            raise InputFault(f"no equilibrium in any pose, at {name}: {why}")
+            raise InputFault(f"no equilibrium is found in any pose, at {name}: {why}")
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
             if named[worst.pose].leaves(short_read, hands[worst.hand]):

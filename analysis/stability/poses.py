@@ -403,7 +403,7 @@ def at_equilibrium(
         for each in find_stand_ins(work.responses):
             tell(f"  {each}")
         if not held_at:
-            raise InputFault("the scene has no equilibrium in any pose of its run, in a firm grip")
+            raise InputFault("no equilibrium is found in any pose of the run, in a firm grip")
         yield at_rest, held_at
 
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from fractions import Fraction
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from studies.said.growth import SCALES, growth_of
-from studies.said.measure import compare
+from studies.said.growth import SCALES, Growth, Odd, growth_of, step_of
+from studies.said.measure import _rate, compare
 
 P, RATE = 0.05, 400
 
 
 class Motion:
-    """The rows of a run of which two modes move handle and mechanism, and an even creep (m/s)."""
+    """The rows of a run of which two modes move handle and mechanism, the slower one `uneven` over
+    each second, and an even creep (m/s)."""
+
+    fault = None
 
     def __init__(
         self,
@@ -24,11 +29,13 @@ class Motion:
         seconds: float,
         creep: float = 0.0,
         faint: tuple[float, float] = (0.0, 0.0),
+        uneven: float = 0.0,
     ) -> None:
         self.t = np.arange(round(seconds * RATE)) / RATE
         turning = np.cos(2 * np.pi * hertz * self.t + 0.3)
         fast = 5.0 * np.exp(-9.0 * self.t)
-        self.x = 0.05 + size * (np.exp(rate * self.t) * turning + fast) + creep * self.t
+        grown = np.exp(rate * self.t + uneven * np.sin(2 * np.pi * self.t))
+        self.x = 0.05 + size * (grown * turning + fast) + creep * self.t
         self.faint = faint[0] * size * np.exp(faint[1] * self.t)
 
     def time(self, name: str) -> Any:
@@ -83,3 +90,56 @@ def test_what_is_not_clean_decides_nothing() -> None:
     motion.x += 1e-9 * np.random.Generator(np.random.PCG64(1)).standard_normal(len(motion.x))
     told = {"growth_rate": -0.5, "frequency": 0.0, "uncertainty": 0.0}
     assert compare(told, growth_of(motion, P, -0.5))[0] == "undecided"
+
+
+def test_what_goes_with_the_square_of_a_nudge_is_no_mode() -> None:
+    told = {"growth_rate": -1.8, "frequency": 1.6, "uncertainty": 0.0}
+    to, fro = (Motion(-1.8, 1.6, s * 4e-7, 14.0, faint=(s * 1e-3, -0.2)) for s in (1.0, -1.0))
+    assert compare(told, growth_of(to, P, -1.8))[0] == "contradicted"
+    assert compare(told, growth_of(Odd(to, fro), P, -1.8))[0] == "agree"
+
+
+def test_what_is_uneven_over_a_hyperperiod_is_fitted_over_whole_ones() -> None:
+    told = {"growth_rate": -1.5, "frequency": 0.0, "uncertainty": 0.0}
+    motion = Motion(-1.5, 0.0, 3e-7, 14.0, uneven=0.1)
+    assert compare(told, growth_of(motion, 12 / RATE, -1.5))[0] == "contradicted"
+    step = step_of(Fraction(RATE), Fraction(33), -1.5)
+    assert compare(told, growth_of(motion, step, -1.5))[0] == "agree"
+    assert compare(told | {"growth_rate": -1.7}, growth_of(motion, step, -1.5))[0] == "contradicted"
+
+
+@pytest.mark.parametrize(("graphics", "says"), [(33, "undecided"), (50, "contradicted")])
+def test_frames_of_different_lengths_contradict_nothing(graphics: int, says: str) -> None:
+    case = {"growth_rate": 10.7, "frequency": 4.5, "uncertainty": 0.0, "saturated": False}
+    scene: Any = SimpleNamespace(
+        record={"hands": {"firm grip": {}}},
+        haptic=Fraction(RATE),
+        graphics=Fraction(graphics),
+        step=lambda told, _: step_of(Fraction(RATE), Fraction(graphics), told),
+        run=lambda *_: (Growth(22.0, 0.8, 0.0, 0.03), None),
+    )
+    assert _rate(scene, case | {"hand": "firm grip", "pose": "0 s"})[2] == says
+
+
+def test_a_decay_ends_above_what_is_rounded() -> None:
+    told = {"growth_rate": -0.436, "frequency": 0.25, "uncertainty": 0.0}
+    for seed in range(8):
+        motion = Motion(-0.436, 0.25, 3e-6, 50.0)
+        motion.x += 1e-15 * np.random.Generator(np.random.PCG64(seed)).standard_normal(
+            len(motion.t)
+        )
+        assert compare(told, growth_of(motion, 1.0, -0.436))[0] == "agree"
+
+
+def test_frames_agree_where_hyperperiods_are_too_few() -> None:
+    motion = Motion(-1.86, 0.0, 3e-7, 8.0)
+    scene: Any = SimpleNamespace(
+        record={"hands": {"firm grip": {}}},
+        haptic=Fraction(RATE),
+        graphics=Fraction(33),
+        step=lambda *_: 1.0,
+        run=lambda *_: (Growth(-2.03, 0.16, 0.0, 1.0), motion),
+    )
+    case = {"frequency": 0.0, "uncertainty": 0.0, "saturated": False, "hand": "firm grip"}
+    for told, says in ((-1.86, "agree"), (-1.7, "undecided")):
+        assert _rate(scene, case | {"growth_rate": told, "pose": "0 s"})[2] == says

@@ -563,6 +563,20 @@ def test_a_run_without_a_pose_is_refused_with_its_own_fault() -> None:
         visited_poses(replace(run, tables={}))
 
 
+def test_an_equilibrium_that_is_not_found_is_not_said_to_be_none() -> None:
+    """At 21 Hz there is one, in which the loop rests at 21.2 Hz too; there it grows by e^26 over
+    the 2.5 s after which frames and ticks repeat, and no search stays near it."""
+    gains = {"stiffness": [27.22, 27.22, 0.1153], "damping": [5.899, 5.899, 0.0274]}
+    lost = {
+        **{f"controller.teleoperation.{key}": value for key, value in gains.items()},
+        **{"haptics.rate": 256, "graphics.rate": 21.2, "hold": "lead", "stop_when": ""},
+        **{"mechanism_at": "graphics", "directions_from": "mechanism"},
+        **{"linkage.gravity": [0.0, -1.534], "controller.bias": "full"},
+    }
+    with pytest.raises(hl.InputFault, match=r"^no equilibrium is found in any pose, at 0 s: "):
+        hl.stability("closed-loop-ideal", lost, poses=1)
+
+
 def test_what_cannot_be_held_is_refused() -> None:
     with pytest.raises(hl.InputFault, match="--equilibrium"):
         hl.stability("closed-loop-ideal", {"graphics.rate": {"min": 20, "max": 60, "seed": 1}})
