@@ -7,7 +7,8 @@ others A_pN is A_N. All matrices are of the co-simulation that runs, around the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ import numpy as np
 
 from hapticlink.analysis.stability import frozen_nonlinearities
 from hapticlink.analysis.stability.equilibrium import equilibrium
+from hapticlink.analysis.stability.hand_cases import SLIGHT
 from hapticlink.analysis.stability.lifted_map import behind_start, open_lifted_map
 from hapticlink.analysis.stability.linear_period import linear_period
 from hapticlink.analysis.stability.smooth_scene import linearisable
@@ -58,14 +60,13 @@ class VaryingStability:
 
     @property
     def mean_square(self) -> str:
-        return "stable" if self.second_moment < 1.0 else "unstable"
+        """Marginal where it takes more than a minute to double, as at fixed rates."""
+        return _verdict(growth(self.second_moment, self.frames, self.tick), SLIGHT, "marginal")
 
     @property
     def almost_surely(self) -> str:
         """By the Lyapunov exponent; undecided where its confidence interval holds 0."""
-        if abs(self.exponent) <= self.confidence:
-            return "undecided"
-        return "stable" if self.exponent < 0.0 else "unstable"
+        return _verdict(self.exponent, self.confidence, "undecided")
 
     @property
     def verdict(self) -> str:
@@ -106,6 +107,18 @@ class VaryingStability:
             yield from (f"  {line}" for line in self.frozen)
 
 
+def growth(second_moment: float, frames: Sequence[int], tick: float) -> float:
+    """The rate (1/s) at which root mean squares grow, ln(radius)/2 a frame. By Jensen's inequality
+    no Lyapunov exponent exceeds it; a sequence that is drawn can, by what it has grown before its
+    directions have settled."""
+    per_frame = math.log(second_moment) / 2 if second_moment else -math.inf
+    return per_frame / (float(np.mean(frames)) * tick)
+
+
+def _verdict(rate: float, slight: float, otherwise: str) -> str:
+    return otherwise if abs(rate) <= slight else "stable" if rate < 0.0 else "unstable"
+
+
 def varies(scene: Scene) -> bool:
     """Whether a rate of the scene is drawn at random."""
     return any(isinstance(pace.rate, VariableRate) for pace in clocks(scene).paces.values())
@@ -127,12 +140,13 @@ def varying_stability(scene: str | Path | Scene, options: Options = ()) -> Varyi
         lengths, seed = range(low, high + 1), rate.seed
         edges = edges_of(read, system, place, list(lengths))
     exponent, width = lyapunov(edges, seed)
+    second, tick = mean_square(edges), float(system.timeline.base)
     return VaryingStability(
         title=read.title,
         frames=tuple(lengths),
-        tick=float(system.timeline.base),
-        second_moment=mean_square(edges),
-        exponent=exponent,
+        tick=tick,
+        second_moment=second,
+        exponent=min(exponent, growth(second, lengths, tick)),
         confidence=width,
         seed=seed,
         frozen=(*removed, *frozen_nonlinearities.describe_switches(system)),

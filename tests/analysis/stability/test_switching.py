@@ -16,7 +16,11 @@ from hapticlink.analysis.stability.switching import (
     lyapunov,
     mean_square,
 )
-from hapticlink.analysis.stability.varying_rate import varying_stability
+from hapticlink.analysis.stability.varying_rate import (
+    VaryingStability,
+    growth,
+    varying_stability,
+)
 from tests.analysis.stability.own_hand import own_hand
 from tests.analysis.stability.test_stability import HELD
 
@@ -113,3 +117,26 @@ def test_the_hold_that_a_refusal_names_is_not_refused() -> None:
     assert named
     for hold in named:
         assert hl.equilibrium_stability("closed-loop-ideal", {**options, "hold": hold}).verdict
+
+
+@pytest.mark.parametrize(
+    ("radius", "exponent", "said"),
+    [
+        (1.0000016, 3.2e-5, ("marginal", "undecided")),
+        (0.9999984, -3.2e-5, ("marginal", "undecided")),
+        (0.99, -0.5, ("stable", "stable")),
+        (1.01, -0.5, ("unstable", "stable")),
+    ],
+)
+def test_what_takes_more_than_a_minute_to_double_is_marginal(
+    radius: float, exponent: float, said: tuple[str, str]
+) -> None:
+    found = VaryingStability("", (9, 10, 11), 0.0025, radius, exponent, 3e-3, 1, ())
+    assert (found.mean_square, found.almost_surely) == said
+    assert found.exponent <= growth(radius, found.frames, found.tick) + 1e-6
+
+
+def test_second_moments_of_one_matrix_grow_twice_as_its_eigenvalue() -> None:
+    """Of x' = a x each frame the bound is the Lyapunov exponent, ln a over the frame."""
+    second = mean_square(switched([np.array([[1.2]])] * 2, 0.5))
+    assert growth(second, (10, 10), 0.0025) == pytest.approx(math.log(1.2) / 0.025, rel=1e-9)
