@@ -70,8 +70,8 @@ def one_pass(component: Component) -> OnePass:
 
 
 def functions_of_fmu(component: Component) -> OnePass:
-    """Those of `one_pass` with sines and cosines of their own: what an FMU contains. Their slopes
-    are those of the former, which are shorter."""
+    """Those of `one_pass` with sines and cosines of their own: what an FMU contains, in every
+    packaging."""
     parts = one_pass(component)
     with _without_simplification():
         own: dict[str, Any] = {

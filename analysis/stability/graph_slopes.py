@@ -24,7 +24,7 @@ import casadi as ca
 import numpy as np
 
 from hapticlink.fmus.blocks import component
-from hapticlink.fmus.fmu_functions import one_pass
+from hapticlink.fmus.fmu_functions import functions_of_fmu
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.fmi.description import Description
 from hapticlink.orchestrator.scene.blocks import blocks
@@ -50,7 +50,7 @@ def graph_slopes(found: Description, fmu: str, scene: Scene | None) -> GraphSlop
     if block is None:
         return None
     made = component(block.block, block.settings)
-    functions = {f.name(): f for f in one_pass(made).functions}
+    functions = {f.name(): f for f in functions_of_fmu(made).functions}
     if len(_GENERATED) == KEPT:
         _GENERATED.clear()
     _GENERATED[found.guid] = GraphSlopes(functions, made.timing == "sampled", made.substeps)

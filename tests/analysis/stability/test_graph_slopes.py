@@ -147,3 +147,23 @@ def test_threads_that_judge_at_once_have_slopes_of_their_own() -> None:
     finally:
         sys.setswitchinterval(often)
     assert found == [[one] * 1000 for one in alone]
+
+
+def test_a_native_fmu_has_the_bits_of_a_python_one() -> None:
+    """Verdicts take native FMUs where the cache has them, and say the same to the byte."""
+    found = []
+    for packaging in ("python", "native"):
+        scene = open_scene.load("pendulum", [f"packaging={packaging}"])
+        with build_system(scene) as system:
+            graph = graph_slopes(
+                system.fmu["virtual_mechanism"].description, "virtual_mechanism", scene
+            )
+        assert graph
+        draw = np.random.default_rng(4)
+        before, own = (
+            draw.normal(size=sum(graph._n)),
+            draw.normal(size=(3, sum(graph._n) - 1 - graph._n[2])),
+        )
+        found.append([*graph.step(before, own, 1 / 512), *graph.get(before, own)])
+    for python, native in zip(*found, strict=True):
+        assert python.tobytes() == native.tobytes()
