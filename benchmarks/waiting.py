@@ -93,6 +93,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         [
             "# What a user waits for",
             "",
+            *_finding(rows),
             f"Made by `{command}`: processor seconds, the least of {1 if quick else ROUNDS}, on "
             f"{system()}, at a load of {load_average():.1f}. What is measured: "
             "[waiting.py](../../benchmarks/waiting.py).",
@@ -101,6 +102,17 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             "",
         ]
     )
+
+
+def _finding(rows: Rows) -> list[str]:
+    """Of what is measured by turns with another checkout, the ratios after / before."""
+    kinds: dict[str, list[float]] = {}
+    for what, row in ((key[0], row) for key, row in rows.rows.items()):
+        if row["before_s"] and not what.startswith("floor"):
+            ratio = float(row["after_s"]) / float(row["before_s"])
+            kinds.setdefault(what.split()[0].rstrip(","), []).append(ratio)
+    said = (f"{kind} {min(r):.2g} to {max(r):.2g}" for kind, r in kinds.items())
+    return [f"Processor time, after / before: {', '.join(said)}.", ""] if kinds else []
 
 
 def _items(quick: bool) -> Iterator[tuple[str, list[str]]]:
