@@ -85,7 +85,7 @@ def _measured(
         text = file.read_text(encoding="utf-8")
         opened = browser.new_page()
         opened.goto(f"file://{file}")
-        opened.wait_for_function("() => view.frame")
+        opened.wait_for_function('() => typeof view !== "undefined" && view.frame')
         opened.click("#pause")
         runs, nodes, wall = list[float](), list[float](), list[float]()
         for _ in range(rounds):
