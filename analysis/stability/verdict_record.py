@@ -177,8 +177,8 @@ class Stability:
     def _below(self) -> Iterator[str]:
         """What stands below the table of hands: margins, remedies, and what was left out."""
         poses = {case.pose for case in self.cases}
-        alone = " (other poses may have less)" if len(poses) > 1 else ""
-        yield f"margin at {self.worst.pose}{alone}: {', '.join(self._margins())}"
+        alone = "; other poses may have less" if len(poses) > 1 else ""
+        yield f"margin at {self.worst.pose} (drifts aside{alone}): {', '.join(self._margins())}"
         full = dict.fromkeys(case.pose for case in self.cases if case.saturated)
         if full:
             yield (

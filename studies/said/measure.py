@@ -12,7 +12,7 @@ import numpy as np
 
 import hapticlink as hl
 from hapticlink.orchestrator.scene.overrides import parse
-from studies.said.growth import SCALES, Growth, Odd, growth_of, hyperperiod, step_of
+from studies.said.growth import SCALES, Growth, Odd, growth_of, hertz, hyperperiod, step_of
 
 NUDGES = (np.array([1.0, -0.7, 5.0]),) * 2 + (np.array([-0.4, 1.0, -3.0]),)
 """Of the hand, in its three directions (m, m, rad), of a run and of the next ones, which are seen
@@ -239,6 +239,11 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
     return *row, says, why
 
 
+def _drifts(rate: float, frequency: float) -> bool:
+    """Slow in the words of `stability`: by less than 0.2 1/s and below 1 Hz."""
+    return rate < 0.2 and frequency < 1.0
+
+
 def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
     """Whether in the pose and hand of a case more than a drift, and than twice what is marginal
     there, grows; None where that is not clean."""
@@ -254,7 +259,7 @@ def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
             return True
         if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
             least = 2.2 * slow if case["verdict"] == "marginal" else 0.0
-            return run.rate > max(SLIGHT, least) and not run.drifts
+            return run.rate > max(SLIGHT, least) and not _drifts(run.rate, hertz(ended, run.step))
         early, late = (float(part.max()) for part in np.array_split(size, 8)[::7])
         if late > 100 * early:
             return True

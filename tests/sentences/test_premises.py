@@ -96,10 +96,10 @@ def test_a_verdict_says_for_what_it_is_and_what_it_left_out() -> None:
 def test_a_margin_says_that_other_poses_may_have_less() -> None:
     one = [("0 s", hand, -1.0, "stable", "oscillation") for hand in HANDS]
     (line,) = (line for line in verdict(*one).lines() if line.startswith("margin"))
-    assert line == "margin at 0 s: stiffnesses times 2"
+    assert line == "margin at 0 s (drifts aside): stiffnesses times 2"
     several = verdict(*one, ("1 s", "firm grip", -2.0, "stable", "oscillation"))
     (line,) = (line for line in several.lines() if line.startswith("margin"))
-    assert line.startswith("margin at 0 s (other poses may have less): ")
+    assert line.startswith("margin at 0 s (drifts aside; other poses may have less): ")
 
 
 SPRING: dict[str, Any] = {

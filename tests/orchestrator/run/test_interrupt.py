@@ -8,6 +8,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -78,12 +79,19 @@ def test_a_signal_during_a_build_speaks_of_no_run(bar, tmp_path):
 def children(pid: int) -> list[str]:
     """The processes that a process has started, where there is /proc."""
     tasks = Path(f"/proc/{pid}/task").glob("*/children")
-    return [child for task in tasks if task.exists() for child in task.read_text().split()]
+    found = []
+    for task in tasks:
+        with suppress(FileNotFoundError, ProcessLookupError):  # the thread has ended meanwhile
+            found += task.read_text().split()
+    return found
 
 
 def workers(pid: int) -> list[bytes]:
     """Command lines of the worker processes that a process has."""
-    found = [Path(f"/proc/{child}/cmdline").read_bytes() for child in children(pid)]
+    found = []
+    for child in children(pid):
+        with suppress(FileNotFoundError, ProcessLookupError):  # it has ended meanwhile
+            found.append(Path(f"/proc/{child}/cmdline").read_bytes())
     return [line for line in found if b"orchestrator.fmi.worker" in line]
 
 
