@@ -88,7 +88,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         progress(what, k, len(items))
         rows.add(what, *_measured(arguments, both, 1 if quick else ROUNDS))
     shown = [[row[column] or "-" for column in COLUMNS] for row in rows.rows.values()]
-    heads = "what | before (s) | after (s) | ratio by a neighbour | equilibria, slopes, products"
+    heads = "what | before (s) | after (s) | beside a busy neighbour | equilibria, slopes, products"
     return "\n".join(
         [
             "# What a user waits for",

@@ -31,7 +31,7 @@ from hapticlink.analysis.stability.lifted_map import long_enough, open_lifted_ma
 from hapticlink.analysis.stability.linear_period import LinearPeriod
 from hapticlink.analysis.stability.margin_and_remedy import SAFE, Margin, _Search, improvements
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
-from hapticlink.analysis.stability.modes import DRIFT, kind, modes
+from hapticlink.analysis.stability.modes import DRIFT, Mode, kind, modes
 from hapticlink.analysis.stability.poses import (
     Pose,
     at_pose,
@@ -48,7 +48,7 @@ from hapticlink.commands.progress import steps
 from hapticlink.components.blocks.start_settings import without_start_values
 from hapticlink.components.device.models import device_model
 from hapticlink.components.specs.device import Device
-from hapticlink.components.specs.hand import ArmHand, SpringHand
+from hapticlink.components.specs.hand import ArmHand, Hand, SpringHand
 from hapticlink.fmus.blocks import find_block, has_compiled
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault, Interrupted
 from hapticlink.orchestrator.scene import overrides
@@ -317,6 +317,28 @@ def test_gains_without_an_equilibrium_are_not_known_to_be_unstable(
     margin, _ = improvements(slider, pose, HANDS, DRIFT, case, lambda _: ([pose], ""))
     assert margin.stiffness == pytest.approx(1.3, rel=0.02)
     assert ("stiffness" not in margin.not_searched_further) == known
+
+
+def test_a_margin_leaves_drifts_aside(slider: hl.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As its line says: below it grows what is slower than 1 Hz, above it what is not."""
+
+    class Drifting(InHands):
+        def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0):
+            self._hertz, self._seconds = 0.5 * (scales or {}).get("drift", 1.0), 1 / 64
+
+        def _leading(self, hand: Hand | None) -> tuple[Mode, Any, int]:
+            growth, omega = 0.1, 2 * math.pi * self._hertz
+            z = np.exp(complex(growth, omega) * self._seconds)
+            mode = Mode(z, 1e-9, growth, omega, np.zeros(0), np.zeros(0))
+            return mode, Mock(traced=lambda mode: mode), 0
+
+    monkeypatch.setattr(margin_and_remedy, "InHands", Drifting)
+    pose = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)[0]
+    case = Case(pose.name, "firm grip", 0.1, 0.0, 0.5, "drift", "unstable", ())
+    margin, _ = improvements(slider, pose, HANDS, DRIFT, case, lambda _: ([pose], ""))
+    assert margin.stiffness == pytest.approx(2.0, rel=0.02)
+    told = Mock(cases=[case], worst=case, remedies=(), without={}, _margins=lambda: ["half"])
+    assert next(Stability._below(told)) == "margin at 0 s (drifts aside): half"
 
 
 SLIDER = """
