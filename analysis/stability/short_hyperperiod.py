@@ -59,11 +59,12 @@ def repetition(read: Scene) -> float:
     return (time := timeline(read)).seconds(hyperperiod(time))
 
 
-def whole_frames(read: Scene) -> Scene:
-    """The scene at the graphics rate next to its own with which frames are whole haptic periods.
-    Raises InputFault for one that varies."""
-    whole = read.graphics and exact(read.haptics.rate) / frame_length(read)
-    return open_scene.load(read, [set_rate("graphics", whole)] if whole else ())
+def whole_frames(read: Scene) -> tuple[Scene, str]:
+    """The scene as it repeats after a frame: where its own frames are no whole haptic periods,
+    `in_periods` of one. Raises InputFault for a rate that varies."""
+    if read.graphics is None or (exact(read.haptics.rate) / graphics_rate(read)).denominator == 1:
+        return read, ""
+    return in_periods(read)
 
 
 def frame_length(read: Scene) -> int:

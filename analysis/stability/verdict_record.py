@@ -243,8 +243,9 @@ class Stability:
             least = f"down to times {2.0**-DOUBLINGS:.1g}"
             yield some if margin.stiffness else f"stable with no stiffnesses tried, {least}"
         if margin.delay is not None:
-            some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of further delay")
-            yield some if margin.delay else "less than a haptic period of further delay"
+            what = "further delay of the controller's forces"
+            some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of {what}")
+            yield some if margin.delay else f"less than a haptic period of {what}"
         if margin.rate is not None:
             down = f"down to {-float(_within(-margin.rate, 3)):g} Hz in whole haptic periods"
             some = told("rate", "graphics ", down)

@@ -22,6 +22,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
@@ -52,7 +53,7 @@ from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.base.errors import FmuFault, InputFault
 from hapticlink.orchestrator.base.terminal_output import align_columns
-from hapticlink.orchestrator.base.ticks import exact
+from hapticlink.orchestrator.base.ticks import exact, write_exact
 from hapticlink.orchestrator.results.numbers import short
 from hapticlink.orchestrator.scene.scene import Scene
 
@@ -96,7 +97,8 @@ class Constraint:
 class Transparency:
     """How a scene feels at a pose of its run. growing: the cases, of a handle that is let go and of
     the hands of `stability`, in which something grows by more than a drift; steady_in: the hands in
-    which nothing does. stand_ins: what stands for FMUs whose state cannot be read."""
+    which nothing does. stand_ins: what stands for FMUs whose state cannot be read. rounded: which
+    graphics rate is judged in place of one whose frames are no whole haptic periods."""
 
     title: str
     pose: str
@@ -106,6 +108,7 @@ class Transparency:
     growing: tuple[Case, ...] = ()
     steady_in: tuple[str, ...] = ()
     stand_ins: tuple[StandIn, ...] = ()
+    rounded: str = ""
 
     @property
     def right_up_to(self) -> float:
@@ -123,6 +126,8 @@ class Transparency:
         """The result as text."""
         yield f"at {self.pose}:"
         yield from self._unstable()
+        if self.rounded:
+            yield f"  {self.rounded}"
         for each in self.stand_ins:
             yield f"  {each}"
         if self.growing and not self.steady_in:
@@ -164,6 +169,7 @@ class Transparency:
             "pose": self.pose,
             "unstable": [case.record() for case in self.growing],
             "steady_in": list(self.steady_in),
+            "rounded": self.rounded,
             **record_stand_ins(self.stand_ins),
             "right_up_to": self.right_up_to,
             "frequencies": HERTZ.tolist(),
@@ -191,15 +197,16 @@ def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
     """How a scene feels at `count` poses of its own run, held there by a spring that is cut off
-    again, with frames of whole haptic periods. Raises InputFault for a scene without device,
+    again, with `whole_frames`. Raises InputFault for a scene without device,
     controller or linkage, and where no pose has an equilibrium."""
     read = open_scene.load(scene, options)
-    poses, whole = _visit_poses(read, count), whole_frames(read)
+    poses, (whole, rounded) = _visit_poses(read, count), whole_frames(read)
     found, why = [], ""
     for pose in poses:
         try:
             with resting(whole, pose.held, at=pose.start) as place:
-                found.append(_measure_felt(read, place, pose.name, {}))
+                felt = _measure_felt(read, place, pose.name, {})
+                found.append(replace(felt, rounded=rounded))
         except (InputFault, FmuFault) as fault:
             why = f"{pose.name}: {fault}"
     if not found:
@@ -316,7 +323,7 @@ def costs(
     for name, factor in (("half", 0.5), ("twice", 2.0)):
         changes[f"{name} the haptic rate"] = {"haptics.rate": factor * rate}
         if read.graphics is not None and isinstance(read.graphics.rate, int | float | str):
-            changed_rate = factor * float(exact(read.graphics.rate))
+            changed_rate = write_exact(Fraction(factor) * exact(read.graphics.rate))
             changes[f"{name} the graphics rate"] = {"graphics.rate": changed_rate}
     for name, ports in late.items():
         changes[f"{name} a haptic period late"] = {"delays": dict.fromkeys(ports, 1.0 / rate)}
@@ -325,9 +332,10 @@ def costs(
     found = []
     for name, change in changes.items():
         try:
-            whole = whole_frames(open_scene.load(read, change))
+            whole, rounded = whole_frames(open_scene.load(read, change))
             with resting(whole, pose.held, at=pose.start) as place:
-                found.append(_cost(read, place, name))
+                cost = _cost(read, place, name)
+                found.append(replace(cost, felt=replace(cost.felt, rounded=rounded)))
         except (InputFault, FmuFault) as fault:
             tell(f"  {name}: {fault}")
     return found
@@ -355,12 +363,15 @@ HEADS = (
 
 
 def cost_lines(found: Sequence[ChangeCost]) -> Iterator[str]:
-    """The costs as a table; what changes nothing in one row."""
+    """The costs as a table, what changes nothing in one row; and which are of other rates."""
     rows: dict[tuple[str, ...], list[str]] = {}
+    others: dict[str, list[str]] = {}
     for cost in found:
         rows.setdefault(cost.cells(), []).append(cost.change)
+        others.setdefault(cost.felt.rounded, []).append(cost.change)
     table = [HEADS, *((", ".join(names), *cells) for cells, names in rows.items())]
     yield from align_columns(table)
+    yield from (f"{rounded}: {', '.join(names)}" for rounded, names in others.items() if rounded)
 
 
 def _stiffness(felt: Transparency) -> str:

@@ -111,9 +111,8 @@ class _Tuning:
         self._rendered = rendered_directions(device.handle, device.space)
 
     def search(self) -> Scales:
-        """The scales of the largest gains with which margin and run hold, with frames of whole
-        haptic periods."""
-        quick = whole_frames(self._read)
+        """The scales of the largest gains with which margin and run hold, with `whole_frames`."""
+        quick, _ = whole_frames(self._read)
         self._tell("the scene's own run, for its poses")
         run = simulate_scene(self._read)
         moments = choose_evenly_spaced(run, self._linkage, POSES)
@@ -196,7 +195,7 @@ class _Tuning:
         """Adds the margins at neighbouring rates to the result, 0 where there is no equilibrium."""
         margins = self.result.margins
         for rate in near_rates(self._read):
-            near = whole_frames(open_scene.load(self._read, [rate]))
+            near, _ = whole_frames(open_scene.load(self._read, [rate]))
             try:
                 with self._at_equilibrium(near) as (_, held):
                     margins[rate] = Judge(held).margin(scales, COARSE)

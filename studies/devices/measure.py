@@ -87,7 +87,7 @@ class Judged:
 
 def judged(name: str) -> Judged:
     """That of a device, with frames of whole haptic periods."""
-    read = whole_frames(hl.scene(SCENE, options(name)))
+    read, _ = whole_frames(hl.scene(SCENE, options(name)))
     assert read.linkage is not None
     pose = choose_evenly_spaced(simulate_scene(read), read.linkage, 1)[0]
     with resting(read, pose.held, at=pose.start) as place:

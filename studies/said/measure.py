@@ -299,7 +299,7 @@ def _damping(scene: Checked) -> Iterator[Claim]:
 
 def _margins(scene: Checked) -> Iterator[Claim]:
     margin, options, haptic = scene.record["margin"], scene.options, float(scene.haptic)
-    reads = [" -> ".join(c) for c in scene.connections if c[1].startswith("controller")]
+    forces = [" -> ".join(c) for c in scene.connections if c[0].startswith("controller")]
 
     def scaled(s: float) -> Row:
         by = {"stiffness": s, "damping": s**0.5}
@@ -310,7 +310,7 @@ def _margins(scene: Checked) -> Iterator[Claim]:
 
     def later(n: float) -> Row:
         given = {str(k): float(v) for k, v in options.get("delays", {}).items()}
-        late = {c: given.get(c.partition(" -> ")[0], 0.0) + n / haptic for c in reads}
+        late = {c: given.get(c.partition(" -> ")[0], 0.0) + n / haptic for c in forces}
         return {"delays": given | late if n else given}
 
     def framed(n: float) -> Row:

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import shlex
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -170,19 +170,23 @@ def test_a_hand_in_place_of_another_has_the_map_of_its_own_fmu(place: RestingSce
     assert leading(in_arm) == pytest.approx([mode.z for mode in loaded], abs=1e-4)
 
 
-@pytest.mark.parametrize("late", [1, 3])
-def test_a_delay_in_place_of_none_has_the_map_of_late_samples(
-    place: RestingScene, late: int
-) -> None:
-    connections = place.map.system.connections
-    into = (c.name for c in connections if c.target == "controller")
-    with resting(
-        "closed-loop-direct", SCENE | {"delays": dict.fromkeys(into, late / 512)}
-    ) as loaded:
-        expected = leading(loaded.period({}))
-    assert leading(place.period({}).delayed("controller", late)) == pytest.approx(
-        expected, abs=1e-5
-    )
+@pytest.mark.parametrize(("hold", "late"), [("zoh", 1), ("foh", 3)])
+def test_a_delay_in_place_of_none_has_the_map_of_late_forces(hold: str, late: int) -> None:
+    """Of late samples, too, but where a hold extrapolates these further."""
+    given = SCENE | {"hold": hold}
+    with resting("closed-loop-direct", given) as place:
+        connections = place.map.system.connections
+        found = leading(place.period({}).delayed("controller", late))
+
+    def as_loaded(delayed: Iterable[str]) -> list[complex]:
+        options = given | {"delays": dict.fromkeys(delayed, late / 512)}
+        with resting("closed-loop-direct", options) as loaded:
+            return leading(loaded.period({}))
+
+    forces = as_loaded(c.name for c in connections if c.source == "controller")
+    samples = as_loaded(c.name for c in connections if c.target == "controller")
+    assert found == pytest.approx(forces, abs=1e-5)
+    assert (found == pytest.approx(samples, abs=1e-5)) == (hold == "zoh")
 
 
 def test_the_scenes_own_hand_has_the_eigenvalues_of_its_sampled_spring() -> None:
@@ -237,18 +241,18 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
         ),
         (
             Margin(1.29, 0.0, 30.0),
-            "stiffnesses times 1.2, less than a haptic period of further delay, graphics down to "
-            "30 Hz in whole haptic periods",
+            "stiffnesses times 1.2, less than a haptic period of further delay of the controller's "
+            "forces, graphics down to 30 Hz in whole haptic periods",
         ),
         (
             Margin(8.77, 0.001953125, 512 / 35),
-            "stiffnesses times 8.7, 1.95 ms of further delay, graphics down to 14.7 Hz in "
-            "whole haptic periods",
+            "stiffnesses times 8.7, 1.95 ms of further delay of the controller's forces, "
+            "graphics down to 14.7 Hz in whole haptic periods",
         ),
         (
             Margin(1024.0, 0.015625, 8.0, ("stiffness", "delay", "rate")),
             "stiffnesses at least times 1000 (not searched further), "
-            "at least 15.6 ms of further delay (not searched further), "
+            "at least 15.6 ms of further delay of the controller's forces (not searched further), "
             "graphics at least down to 8 Hz in whole haptic periods (not searched further)",
         ),
     ],
@@ -405,7 +409,7 @@ def test_inside_of_each_margin_a_changed_scene_is_stable_and_outside_unstable(
     T, frame = 1 / 512, round(512 / margin.rate)
     late = round(margin.delay / T)
     with build_system(slider) as system:
-        into = [c.name for c in system.into("controller")]
+        forces = [c.name for c in system.connections if c.source == "controller"]
 
     def gains(s: float) -> dict[str, Any]:
         stiffness, damping = np.array([100.0, 100.0, 0.1]), np.array([12.0, 12.0, 0.012])
@@ -420,7 +424,7 @@ def test_inside_of_each_margin_a_changed_scene_is_stable_and_outside_unstable(
         }
 
     def delayed(periods: int) -> dict[str, Any]:
-        return {"delays": {name: periods * T for name in into}}
+        return {"delays": {name: periods * T for name in forces}}
 
     inside = [delayed(late), gains(margin.stiffness), {"graphics.rate": f"512/{frame}"}]
     outside = [
