@@ -39,6 +39,7 @@ from hapticlink.analysis.stability.polynomial_holds import (
     read_by,
     sample_arrives,
     slopes_of_powers,
+    slopes_of_sums,
 )
 from hapticlink.analysis.stability.shared_work import KnownSlopes, SharedWork, Slopes
 from hapticlink.analysis.stability.state_vector import (
@@ -255,16 +256,20 @@ class ForwardSensitivity:
         it is evaluated."""
         name = operation.connection
         hold, size = self._simulation.holds[name], reach.state.sizes()[name]
-        if not hold.link:
+        if not hold.link and hold.row.push != "mean":
             call(tick)
             return np.eye(size)
         about = hold.row, hold.parts.matrix, (*hold.parts.turns.items(),), size
         known = self.work.slopes.setdefault((ARRIVED, *about, since), [])
-        if known and not hold.parts.matrix:  # samples are copied
+        if known and not (hold.link and hold.parts.matrix):  # samples are copied
             call(tick)
             return known[0].J
-        made = self._of_any(tick, operation, call, reach)
-        J = made.J[: made.after[0], : made.before[0]]
+        if hold.link:
+            made = self._of_any(tick, operation, call, reach)
+            J = made.J[: made.after[0], : made.before[0]]
+        else:
+            J = slopes_of_sums(hold, self._blocks[name], tick)
+            call(tick)
         known[:] = [Slopes(np.zeros(0), J, np.zeros_like(J))]
         return J
 
