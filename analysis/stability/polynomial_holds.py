@@ -62,8 +62,11 @@ def is_linear(hold: CompiledHold) -> bool:
 
 
 def is_ageless(hold: CompiledHold) -> bool:
-    """Whether the value of a hold follows from its sample and the coordinates of the moment."""
-    return hold.row.needs == "gradient" and hold.row.degree == 0 and not hold.link
+    """Whether the value of a hold follows from its samples, or their sum over a span, and the
+    coordinates of the moment."""
+    row = hold.row
+    ageless = row.gives_samples or row.push == "mean" or row.needs == "gradient"
+    return ageless and row.degree == 0 and not hold.link
 
 
 def sample_arrives(hold: CompiledHold, tick: int) -> bool:
@@ -108,19 +111,16 @@ def slopes_of_powers(
 
 def slopes_of_sums(hold: CompiledHold, block: StateBlock, tick: int) -> Matrix:
     """The slopes of the numbers of the state of a hold, the `block`, by themselves, where it is
-    evaluated: a mean is taken then, and its sum begins anew."""
-    state, own = block.save(), hold.c
-    own.manifold, manifold = 0, own.manifold
-
-    def after(numbers: Vector) -> Vector:
+    evaluated: a mean is taken then, and its sum begins anew. What a manifold makes of the value
+    changes no state."""
+    state = block.save()
+    after = np.eye(len(state.numbers))
+    for numbers in after if hold.row.push == "mean" else ():
         block.restore(state, numbers)
         hold.value(tick, 0.0)
-        return block.numbers()
-
-    columns = [*map(after, np.eye(len(state.numbers)))]
-    own.manifold = manifold
+        numbers[:] = block.numbers()
     block.restore(state, state.numbers)
-    return np.array(columns).T
+    return after.T
 
 
 def advanced_powers(hold: CompiledHold, dt: float) -> Matrix:
