@@ -19,6 +19,7 @@ file.
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Container, Hashable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
@@ -31,6 +32,7 @@ from hapticlink.analysis.stability.closure_directions import Closures
 from hapticlink.analysis.stability.frozen_nonlinearities import discrete
 from hapticlink.analysis.stability.graph_slopes import GraphSlopes, graph_slopes
 from hapticlink.analysis.stability.polynomial_holds import (
+    STEP,
     advanced_powers,
     degree_of,
     is_ageless,
@@ -39,6 +41,7 @@ from hapticlink.analysis.stability.polynomial_holds import (
     read_by,
     sample_arrives,
     slopes_of_powers,
+    slopes_of_sums,
 )
 from hapticlink.analysis.stability.shared_work import KnownSlopes, SharedWork, Slopes
 from hapticlink.analysis.stability.state_vector import (
@@ -72,7 +75,6 @@ from hapticlink.orchestrator.run.run_state import state_blocks
 from hapticlink.orchestrator.run.simulation import Call, Simulation
 from hapticlink.orchestrator.scene.scene import Scene
 
-STEP = 1e-6
 KINK = 1e-3
 """Difference of slopes, relative to the largest of a column, above which there is none."""
 SMALL = 1e-3
@@ -183,13 +185,13 @@ class ForwardSensitivity:
         if isinstance(operation, Evaluate) and operation.connection in self._polynomials:
             made = self._of_polynomial(tick, operation, call, reach, key[1])
         else:
-            made = self._of_any(tick, operation, call, reach)
+            made = self._of_any(tick, operation, call, reach, key[1])
         self._applied[key] = made
         return key, made
 
     def _since(self, tick: int, operation: Instruction, reach: Reach) -> Since:
-        """What the slopes of an operation depend on beside the numbers: the ages of samples; of a
-        polynomial that goes on, the time since it was evaluated."""
+        """What the slopes of an operation depend on beside the numbers: the ages of samples, where
+        these matter; of a polynomial that goes on, the time since it was evaluated."""
         if isinstance(operation, OfFmu):
             return b""
         integers = reach.state.integers()
@@ -197,28 +199,25 @@ class ForwardSensitivity:
             self._evaluated.clear()
         elif isinstance(operation, Push | Blend):
             self._evaluated.pop(operation.connection, None)
-        elif isinstance(operation, Evaluate) and operation.connection in self._polynomials:
-            now, content = tick + operation.ahead, integers.tobytes()
-            before, same = self._evaluated.get(operation.connection, (now, b""))
-            self._evaluated[operation.connection] = now, content
+        elif isinstance(operation, Evaluate):
             hold = self._simulation.holds[operation.connection]
-            if same == content and not sample_arrives(hold, tick):
-                return Fraction(now - before)
-        return self._ages(tick, operation, integers)
-
-    def _ages(self, tick: int, operation: Instruction, integers: NDArray[np.int64]) -> bytes:
-        """The ages of the samples of an operation, where these matter."""
-        holds = self._simulation.holds
-        match operation:
-            case Evaluate(connection) if is_ageless(holds[connection]):
-                return b""
+            if operation.connection in self._polynomials:
+                now, content = tick + operation.ahead, integers.tobytes()
+                before, same = self._evaluated.get(operation.connection, (now, b""))
+                self._evaluated[operation.connection] = now, content
+                if same == content and not sample_arrives(hold, tick):
+                    return Fraction(now - before)
+            if is_ageless(hold):
+                return bytes(ctypes.c_int64(hold.c.span))
         return ages(integers, tick)
 
-    def _of_any(self, tick: int, operation: Instruction, call: Call, reach: Reach) -> Applied:
+    def _of_any(
+        self, tick: int, operation: Instruction, call: Call, reach: Reach, since: Since
+    ) -> Applied:
         """What an operation does that is differentiated."""
         owners = tuple(o for o in reach.state.owners if o != SIGNALS)
         before = reach.state.sizes()
-        slopes, after = self._slopes(tick, operation, call, reach)
+        slopes, after = self._slopes(tick, operation, call, reach, since)
         counts = tuple(n for o, n in before.items() if o != SIGNALS)
         return Applied(
             operation, owners, counts, tuple(after), reach.reads, reach.writes, slopes.J, slopes.E
@@ -255,18 +254,17 @@ class ForwardSensitivity:
         it is evaluated."""
         name = operation.connection
         hold, size = self._simulation.holds[name], reach.state.sizes()[name]
-        if not hold.link:
-            call(tick)
-            return np.eye(size)
-        about = hold.row, hold.parts.matrix, (*hold.parts.turns.items(),), size
+        about = hold.row, hold.parts.matrix, (*hold.parts.turns.items(),), size, bool(hold.link)
         known = self.work.slopes.setdefault((ARRIVED, *about, since), [])
-        if known and not hold.parts.matrix:  # samples are copied
-            call(tick)
-            return known[0].J
-        made = self._of_any(tick, operation, call, reach)
-        J = made.J[: made.after[0], : made.before[0]]
-        known[:] = [Slopes(np.zeros(0), J, np.zeros_like(J))]
-        return J
+        if not known or (hold.link and hold.parts.matrix):  # otherwise samples are copied
+            if hold.link:
+                made = self._of_any(tick, operation, call, reach, since)
+                J = made.J[: made.after[0], : made.before[0]]
+            else:
+                J = slopes_of_sums(hold, self._blocks[name], tick)
+            known[:] = [Slopes(np.zeros(0), J, np.zeros_like(J))]
+        call(tick)
+        return known[0].J
 
     def _powers(self, tick: int, operation: Evaluate, since: Since, size: int) -> Matrix:
         """The slopes of c_0 to c_d by the `size` numbers of the state of a hold, and by what it
@@ -343,7 +341,7 @@ class ForwardSensitivity:
         return call
 
     def _slopes(
-        self, tick: int, operation: Instruction, call: Call, reach: Reach
+        self, tick: int, operation: Instruction, call: Call, reach: Reach, since: Since
     ) -> tuple[Slopes, list[int]]:
         """Slopes of an operation that is carried out, and the numbers of each owner after it."""
         state = reach.state
@@ -354,13 +352,15 @@ class ForwardSensitivity:
         image, (_, written) = state.numbers(after), self._places(reach, after)
         own = zip(state.owners, state.parts(after), strict=True)
         sizes = [len(part) for owner, part in own if owner != SIGNALS]
-        key, known = self._find_known(tick, operation, template, (len(z), len(image)))
+        key, known = self._find_known(since, operation, template, (len(z), len(image)))
         wide = SAME * np.maximum(1.0, np.abs(z[read]))
         for slopes in known:
             if self._copies(operation) or (np.abs(z[read] - slopes.at) <= wide).all():
                 return slopes, sizes
         self.work.counts["differentiated"] += 1
-        coordinates = self._coordinates(key, state, template)
+        if key not in self._named:
+            self._named[key] = state.coordinates(template)
+        coordinates = self._named[key]
         # What nothing reads, as outputs, has the slopes that it has anywhere.
         inert = np.array([bool(known) and coordinates[i].inert for i in read], bool)
 
@@ -396,7 +396,7 @@ class ForwardSensitivity:
         return known[0], sizes
 
     def _find_known(
-        self, tick: int, operation: Instruction, template: Template, sizes: tuple[int, int]
+        self, since: Since, operation: Instruction, template: Template, sizes: tuple[int, int]
     ) -> tuple[tuple[Any, ...], list[Slopes]]:
         """The slopes of an operation that are known, of so many numbers before and after it, and by
         what."""
@@ -412,8 +412,6 @@ class ForwardSensitivity:
                 file = fmu.name, fmu.description.guid
                 key = (type(operation), *file, seconds, parameters.tobytes(), *sizes)
                 return key, self.work.slopes.setdefault(key, [])
-        integers = [np.zeros(0, np.int64), *(each.integers for each in template.holds)]
-        since = self._ages(tick, operation, np.concatenate(integers))
         if isinstance(operation, Set):
             setter = self._simulation.setters[operation.fmu, operation.now]
             if isinstance(setter, Setter):
@@ -453,11 +451,6 @@ class ForwardSensitivity:
         rows = np.concatenate([np.arange(len(J)), graph.n_u + ranks])
         return images[:, rows], J[rows]
 
-    def _coordinates(self, key: Any, state: StateVector, template: Any) -> list[StateEntry]:
-        if key not in self._named:
-            self._named[key] = state.coordinates(template)
-        return self._named[key]
-
     def _directions(
         self,
         operation: Instruction,
@@ -475,19 +468,12 @@ class ForwardSensitivity:
 
     def _places(self, reach: Reach, template: Any) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Of the numbers of a saved state: which an operation reads, and which it writes."""
-        parts = reach.state.parts(template)
-        at, own, signals = 0, [], 0
-        for owner, part in zip(reach.state.owners, parts, strict=True):
-            if owner == SIGNALS:
-                signals = at
-            else:
-                own.append(np.arange(at, at + len(part)))
-            at += len(part)
-        mine = np.concatenate(own) if own else np.zeros(0, dtype=np.intp)
-        return (
-            np.concatenate([mine, reach.reads + signals]),
-            np.concatenate([mine, reach.writes + signals]),
-        )
+        lengths = [len(part) for part in reach.state.parts(template)]
+        places = np.split(np.arange(sum(lengths)), np.cumsum(lengths)[:-1])
+        own = dict(zip(reach.state.owners, places, strict=True))
+        signals = own.pop(SIGNALS)
+        mine = np.concatenate([np.zeros(0, dtype=np.intp), *own.values()])
+        return np.append(mine, signals[reach.reads]), np.append(mine, signals[reach.writes])
 
     def _of(self, operation: Instruction) -> Reach | None:
         if operation not in self._reach:

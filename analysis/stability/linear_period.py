@@ -343,9 +343,6 @@ def linear_period(map_: LiftedMap, point: Vector) -> LinearPeriod:
 
 
 def _rows(applied: Applied, first: Mapping[str, int], counts: Sequence[int], signals: Rows) -> Rows:
-    def each() -> Iterator[Rows]:
-        for owner, count in zip(applied.owners, counts, strict=True):
-            yield np.arange(first[owner], first[owner] + count)
-        yield signals + first[SIGNALS]
-
-    return np.concatenate(list(each())).astype(np.intp)
+    starts = (first[owner] for owner in applied.owners)
+    own = [start + np.arange(n) for start, n in zip(starts, counts, strict=True)]
+    return np.concatenate([*own, signals + first[SIGNALS]]).astype(np.intp)

@@ -7,6 +7,7 @@ With the value y and its powers c_k = y^(k)/k! (per tick^k) up to the degree d o
 whatever the age of the samples: all evaluations between two samples are one matrix. Only the first
 one behind a sample, and the first of a period, depends on the samples, with weights that follow
 from the hold itself at d + 1 instants: its values for samples that are 0 but for one entry of 1.
+A mean is such a hold of degree 0, whose sum begins anew where it is evaluated (`slopes_of_sums`).
 Behind a manifold the law is taken without it: samples lie on it, so that at rest what moves them
 is tangent to it, which the nearest matrix there leaves as it is to the first order. (By differences
 of single entries, which leave it, a matrix next to one of lower rank turns: of a linkage that is
@@ -29,8 +30,8 @@ from hapticlink.orchestrator.run.compiled.state import StateBlock
 
 STEP = 1e-6
 """Of differences, relative to max(1, |z|)."""
-OF_SAMPLES = ("samples", "lead")
-"""What takes the samples of a hold that keeps nothing else."""
+OF_SAMPLES = ("samples", "lead", "mean")
+"""What takes the samples of a hold that keeps nothing but these, or sums of them."""
 LESS = {"WITH_RATE": 0, "WITH_POSE": 1, "ALONE": 2}
 """By how much a cubic, its slope and a line are of less than degree 3, of `ahead`."""
 
@@ -61,8 +62,11 @@ def is_linear(hold: CompiledHold) -> bool:
 
 
 def is_ageless(hold: CompiledHold) -> bool:
-    """Whether the value of a hold follows from its sample and the coordinates of the moment."""
-    return hold.row.needs == "gradient" and hold.row.degree == 0 and not hold.link
+    """Whether the value of a hold follows from its samples, or their sum over a span, and the
+    coordinates of the moment."""
+    row = hold.row
+    ageless = row.gives_samples or row.push == "mean" or row.needs == "gradient"
+    return ageless and row.degree == 0 and not hold.link
 
 
 def sample_arrives(hold: CompiledHold, tick: int) -> bool:
@@ -80,7 +84,9 @@ def slopes_of_powers(
     by the numbers of its state, the `block`, and by what it reads beside these on the `board`."""
     state, degree, own = block.save(), degree_of(hold), hold.c
     spacing = own.stamps[own.count - 1] - own.stamps[own.count - 2] if own.count > 1 else 1
-    between = tick + ahead < own.stamps[own.count - 1]  # samples, at which the law of `ahead` ends
+    between = (
+        own.count and tick + ahead < own.stamps[own.count - 1]
+    )  # samples, at which the law of `ahead` ends
     at = np.arange(degree + 1.0) * (-spacing if between else spacing)
     reads, size = read_by(hold), len(state.numbers)
     z = np.concatenate([state.numbers, board[reads]])
@@ -101,6 +107,20 @@ def slopes_of_powers(
     scaled = powers / float(at[min(1, degree)] or 1.0) ** np.arange(degree + 1)[:, None]
     result: Matrix = np.tensordot(scaled, slopes, 1).reshape(-1, len(z))
     return result
+
+
+def slopes_of_sums(hold: CompiledHold, block: StateBlock, tick: int) -> Matrix:
+    """The slopes of the numbers of the state of a hold, the `block`, by themselves, where it is
+    evaluated: a mean is taken then, and its sum begins anew. What a manifold makes of the value
+    changes no state."""
+    state = block.save()
+    after = np.eye(len(state.numbers))
+    for numbers in after if hold.row.push == "mean" else ():
+        block.restore(state, numbers)
+        hold.value(tick, 0.0)
+        numbers[:] = block.numbers()
+    block.restore(state, state.numbers)
+    return after.T
 
 
 def advanced_powers(hold: CompiledHold, dt: float) -> Matrix:
