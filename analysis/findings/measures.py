@@ -60,10 +60,11 @@ class Constrained(NamedTuple):
 
 class Measures:
     """The measures of a run, each computed when it is asked for; those of paths, forces and torques
-    until a time (s). What a scene does not have, or does not record, is missing or None."""
+    until a time (s). What a scene does not have, or does not record, is missing or None. works:
+    whether `port` has those of single wrenches and of the hands."""
 
-    def __init__(self, results: Results, until: float = math.inf) -> None:
-        self._results, self._until = results, until + 1e-12
+    def __init__(self, results: Results, until: float = math.inf, works: bool = True) -> None:
+        self._results, self._until, self._works = results, until + 1e-12, works
 
     def _within(self, times: Vector, values: Vector) -> Vector:
         """Values until the time."""
@@ -126,7 +127,7 @@ class Measures:
     @cached_property
     def port(self) -> PortEnergy | None:
         """The energy generated at the user's port in the whole run."""
-        port = user_port(self._results)
+        port = user_port(self._results, self._works)
         return port.measured if port and len(port.time_s) else None
 
     @cached_property

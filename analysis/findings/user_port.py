@@ -19,6 +19,7 @@ mobility modulates power. It needs the mechanism's own (`mechanism.directions`) 
 
 from __future__ import annotations
 
+from math import nan
 from typing import NamedTuple
 
 import numpy as np
@@ -118,10 +119,11 @@ def hand_work(results: Results) -> float:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of a run that diverged
-def user_port(results: Results) -> UserPort | None:
+def user_port(results: Results, works_too: bool = True) -> UserPort | None:
     """The energy at the user's port; None without hand, handle and mechanism, where something else
     than its hand pushes a handle, or where the work of another hand is not recorded. Without all
-    signals that its blocks need there are none."""
+    signals that its blocks need there are none. works_too: whether to find the works of single
+    wrenches and that of the hands, which else are none and NaN."""
     mechanism, device = of_block(results, MECHANISM_ENERGY), of_port(results, HANDLE_POSE)
     if mechanism is None or device is None or of_port(results, HAND_WRENCH) is None:
         return None
@@ -155,8 +157,8 @@ def user_port(results: Results) -> UserPort | None:
     blocks = {} if lacks else by_block(results, works, stored, put_in)
     on_handles: Vector = sum(put_in.values(), start=np.zeros(len(time)))
     generated, hands = stored - on_handles, on_handles + further
-    single = _works(results, works, device, time)
-    return UserPort(time, hands, generated, blocks, single, hand_work(results))
+    single = (_works(results, works, device, time), hand_work(results)) if works_too else ({}, nan)
+    return UserPort(time, hands, generated, blocks, *single)
 
 
 def find_other_pushes(results: Results) -> list[str]:

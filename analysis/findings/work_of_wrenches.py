@@ -51,10 +51,10 @@ def _draw_delays(record: RunRecord, connection: str, samples: int) -> Vector | N
 
 def _sums(steps: Callable[[Table], Vector], table: Table) -> Vector:
     """The sums of a table's steps between rows, (..., n), up to each of these."""
-    sums = np.concatenate([steps(block) for block in table.blocks(more=1)], axis=-1)
-    np.cumsum(sums, axis=-1, out=sums)
-    begin = np.zeros((*sums.shape[:-1], 1))
-    return np.concatenate([begin, sums], axis=-1)[..., : len(table.rows)]
+    each = np.concatenate([steps(block) for block in table.blocks(more=1)], axis=-1)
+    sums = np.zeros((*each.shape[:-1], each.shape[-1] + 1))
+    np.cumsum(each, axis=-1, out=sums[..., 1:])
+    return sums[..., : len(table.rows)]
 
 
 def _at(times: Vector, known: Vector, series: Vector) -> Vector:
@@ -191,7 +191,7 @@ class Works:
         at = int(np.searchsorted(times, meter.until)) if meter else 0
         if between := meter and not (at < len(times) and times[at] == meter.until):
             times = np.insert(times, at, meter.until)
-        if moved is table and known is table["time"] and (np.diff(known) > SAME_S).all():
+        if moved is table and known is table["time"] and table.least_step > SAME_S:
             acts, source = _of_one_table(times, table, signal, position, sign)
         else:
             acts = work_as_held(times, force_at, known, moved, position)

@@ -28,7 +28,7 @@ def measure(experiment: Experiment) -> Row:
 
 
 def of_results(results: Results) -> Row:
-    record, measures = results.record, Measures(results)
+    record, measures = results.record, Measures(results, works=False)
     row: Row = {
         "end": record.end.reason,
         "end_time_s": record.end.time,

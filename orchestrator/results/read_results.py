@@ -65,6 +65,11 @@ class Table(Mapping[str, Vector]):
     def _time(self) -> Vector:
         return self._read(0)
 
+    @cached_property
+    def least_step(self) -> float:
+        """The least time (s) from one row to the next."""
+        return float(np.diff(self["time"]).min(initial=math.inf))
+
     def _read(self, places: int | Sequence[int]) -> Vector:
         """Columns; of a file copies, which take less memory than the rows that are mapped."""
         found = self._read_numbers(places)

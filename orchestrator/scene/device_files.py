@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -82,22 +83,22 @@ def put_device_files(data: Mapping[str, Any], written: Mapping[Path, Place]) -> 
     places: dict[Path, Place] = {}
     problems: list[Problem] = []
     for path, table in [*device_tables(data)]:
-        name = table.pop("extends", DEFAULT if _is_changed(table) else None)
+        own_bodies = isinstance(table.get("body"), list)
+        name = table.pop("extends", None if own_bodies else DEFAULT)
         if name is None:
             continue
         try:
-            below, where = _read(name)
+            below, where = _read(name, path)
         except InputFault as fault:
             problems.append(((*path, "extends"), str(fault)))
             continue
         named = {key: table.pop(key) for key in NAMED if isinstance(table.get(key), dict)}
         replaced: set[Path] = set()
-        whole = merge(below, table, replaced)
-        places |= {
-            (*path, *key): place
-            for key, place in where.items()
-            if not (replaced and any(key[:i] in replaced for i in range(1, len(key) + 1)))
-        }
+        whole = merge(below, table, replaced, path)
+        places |= where
+        for at in [*where] if replaced else ():
+            if any(at[:i] in replaced for i in range(len(at) + 1)):
+                del places[at]
         for key, changed in named.items():
             for entry, changes in changed.items():
                 index = _index(whole.get(key), entry)
@@ -121,21 +122,16 @@ NAMED = ("body", "joint")
 """Arrays of a device file whose entries a scene can change by their names."""
 
 
-def _is_changed(table: Mapping[str, Any]) -> bool:
-    """Whether a table changes a device file, and has no bodies of its own."""
-    return not isinstance(table.get("body"), list)
-
-
 def _index(entries: Any, name: str) -> int | None:
     named = [e.get("name") for e in entries] if isinstance(entries, list) else []
     return named.index(name) if name in named else None
 
 
 def _read(
-    name: Any, folder: FilePath | None = None, depth: int = 0
-) -> tuple[Any, dict[Path, Place]]:
+    name: Any, above: Path, folder: FilePath | None = None, depth: int = 0
+) -> tuple[Any, Mapping[Path, Place]]:
     """The tables of a device file, over those of the one that it extends; file and line of each
-    key."""
+    key, whose path begins with that of the device."""
     if not isinstance(name, str):
         raise InputFault(f"{shorten(repr(name))}: write a device's name or path")
     if depth >= MAX_EXTENDED:
@@ -143,15 +139,20 @@ def _read(
     _, text, where = find_scene(name, folder, "device")
     file = str(where / FilePath(name).name) if where else name
     try:
-        tables, own = read_document(text)
+        tables, lines = read_document(text)[0], _locate_keys(text, file, above)
     except ValueError as error:
         raise InputFault(f"{file}: not TOML: {error}") from error
-    lines = {key: (file, line) for key, line in own.items()}
     base = tables.pop("extends", None)
     if base is None:
         return tables, lines
-    below, further = _read(base, where, depth + 1)
-    return merge(below, tables, set()), further | lines
+    below, further = _read(base, above, where, depth + 1)
+    return merge(below, tables, set()), {**further, **lines}
+
+
+@lru_cache(64)  # the same files in each variant of a scene
+def _locate_keys(text: str, file: str, above: Path) -> Mapping[Path, Place]:
+    """File and line of the keys of a text."""
+    return {(*above, *key): (file, line) for key, line in read_document(text)[1].items()}
 
 
 def put_likes(data: Mapping[str, Any]) -> list[Problem]:

@@ -4,9 +4,9 @@ errors of pydantic; and what no value of a scene may be, in a file, an option or
 from __future__ import annotations
 
 import copy
+import re
 import typing
 from collections.abc import Iterator, Sequence
-from contextlib import suppress
 from itertools import islice
 from typing import Any
 
@@ -197,7 +197,7 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
     elif isinstance(value, dict | list):
         of_table = isinstance(value, dict)
         for key, inside in value.items() if isinstance(value, dict) else enumerate(value):
-            if of_table and not _is_unicode(key):
+            if of_table and not (type(key) is str and key.isascii()) and not _is_unicode(key):
                 yield (*path, ascii(key)), "is no Unicode text: write it in UTF-8"
             kind = type(inside)  # tells at once that most values are fine
             fine = kind is float or kind is bool or (kind is str and inside.isascii())
@@ -215,6 +215,8 @@ def find_unrepresentable(value: Any, path: Path = ()) -> Iterator[Problem]:
 
 def _is_unicode(text: Any) -> bool:
     """False of what is no text, too, as a key of a state of a run may be that somebody changed."""
-    with suppress(UnicodeEncodeError, AttributeError):
-        return text.isascii() or bool(text.encode())
-    return False
+    return isinstance(text, str) and not _SURROGATES.search(text)
+
+
+_SURROGATES = re.compile("[\ud800-\udfff]")
+"""What no text of UTF-8 has."""

@@ -26,7 +26,8 @@ from hapticlink.orchestrator.scene.toml_keys import Problem
 
 def check_scene(scene: Scene) -> list[Problem]:
     """Every problem found, up to COUNTED: each may search for a similar name."""
-    found = (space.check_space(scene), linkage.check_linkage(scene), contacts.check_contacts(scene))
+    of_linkage = linkage.check_linkage(scene.linkage, scene.graphics) if scene.linkage else ()
+    found = (space.check_space(scene), of_linkage, contacts.check_contacts(scene))
     shapes = list(islice(chain(*found), COUNTED))
     if shapes and scene.contacts:
         # The broad phase needs a valid tree and valid polygons.

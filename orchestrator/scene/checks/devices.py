@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from hapticlink.components.specs.device import Device, Handle
 from hapticlink.orchestrator.scene.checks.linkage import check_linkage
@@ -17,8 +16,7 @@ _HANDLE: Path = ("linkage", "operational_point")
 def check_devices(scene: Scene) -> Iterator[Problem]:
     for user, device in scene.all_devices.items():
         here = path_of_user("device", user)
-        alone = replace(scene, linkage=device.linkage, graphics=None)
-        found = [*check_linkage(alone)]
+        found = [*check_linkage(device.linkage)]
         if device.linkage.spatial:
             found += check_joints_and_inertias(device.linkage)
             yield from _of_the_plane(device, here)

@@ -15,13 +15,11 @@ from hapticlink.components.specs.joint_types import (
 )
 from hapticlink.components.specs.linkage import NO_POINT, Joint, Linkage, Loop
 from hapticlink.orchestrator.base.errors import unknown
-from hapticlink.orchestrator.scene.scene import Scene
+from hapticlink.orchestrator.scene.scene import Graphics, Scene
 from hapticlink.orchestrator.scene.toml_keys import Path, Problem
 
 
-def check_linkage(scene: Scene) -> Iterator[Problem]:
-    if (linkage := scene.linkage) is None:
-        return
+def check_linkage(linkage: Linkage, graphics: Graphics | None = None) -> Iterator[Problem]:
     here: Path = ("linkage",)
     frames = {"ground": -1}
     for i, body in enumerate(linkage.body):
@@ -42,7 +40,7 @@ def check_linkage(scene: Scene) -> Iterator[Problem]:
     yield from _gears(linkage)
     yield from _limits(linkage)
     yield from _choices(linkage, bodies)
-    if linkage.choices and scene.graphics and scene.graphics.sync == "operational":
+    if linkage.choices and graphics and graphics.sync == "operational":
         message = "nothing pulls the copy while the hand holds no point: take 'exact' or 'joint'"
         yield ("graphics", "sync"), message
     joints = {j.name: j for j in linkage.joint}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -65,6 +66,9 @@ def test_its_blocks_are_all_of_it(scene: str, options: tuple[str, ...]) -> None:
     results, port = with_port(scene, "duration=1.0", *options)
     total = sum(port.blocks_J.values())
     assert np.abs(total - port.generated_J).max() < 1e-15 + 1e-13 * np.abs(port.generated_J).max()
+    fewer = user_port(results, works_too=False)
+    assert fewer
+    assert replace(fewer.measured, works=port.works, hand_work=port.hand_work_J) == port.measured
     meters = results.record.meters
     if port.time_s[-1] == results.record.end.time:
         on_handle = meters["hand.F -> haptic_device.F_hand"].held
