@@ -15,6 +15,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands import main
+from hapticlink.components import registry
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus import lock
 from hapticlink.fmus.build_fmu import build
@@ -118,9 +119,13 @@ def keeping() -> Iterator[ExitStack]:
 @pytest.fixture(scope="module", autouse=True)
 def fmus_unpacked_once(request: pytest.FixtureRequest, keeping: ExitStack) -> None:
     """Loading its FMUs is half of a short run: as in a sweep, those of one module of tests stay
-    unpacked for the next, and runs do not."""
+    unpacked for the next. Runs do not, nor do parts that it has registered, with which no run is
+    kept."""
     for each in shelf._shelves:
         each.clear()
+    for parts in registry._REGISTRIES:
+        for name in [*parts.origins]:
+            del parts[name], parts.origins[name]
     process_cache.trim()
     if not request.node.nodeid.startswith(RUNNING):
         keeping.close()
