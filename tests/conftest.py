@@ -60,7 +60,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def pytest_collection_finish() -> None:
     gc.freeze()  # modules and tests stay: no collection in a test looks through them
     gc.enable()
-    gc.set_threshold(200_000)  # as __main__ has it
 
 
 # pythonfmu is imported above from where it is installed: after a test in which FMPy runs a Python
