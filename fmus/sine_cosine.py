@@ -13,6 +13,7 @@ within 1 ulp for |x| < 8e8; beyond, the products are rounded.
 
 from __future__ import annotations
 
+from functools import cache, reduce
 from typing import Any
 
 import casadi as ca
@@ -65,16 +66,21 @@ def sine_cosine(x: ca.SX) -> tuple[ca.SX, ca.SX]:
     return along * sine + up * cosine, along * cosine - up * sine
 
 
+@cache
+def _both() -> ca.Function:
+    """`sine_cosine` as a function: CasADi repeats it in a fraction of the time that Python takes.
+    To be called first without simplifications, too."""
+    x = ca.SX.sym("x")
+    return ca.Function("both", [x], [*sine_cosine(x)])
+
+
 def _nearest(x: ca.SX) -> ca.SX:
     """The nearest integer, as a function without slope."""
     return ca.floor(x + 0.5)
 
 
 def _polynomial(coefficients: tuple[float, ...], z: ca.SX) -> ca.SX:
-    value = ca.SX(coefficients[-1])
-    for c in reversed(coefficients[:-1]):
-        value = c + z * value
-    return value
+    return reduce(lambda value, c: c + z * value, map(ca.SX, coefficients[::-1]))
 
 
 def with_own_sines(function: ca.Function) -> ca.Function:
@@ -89,7 +95,7 @@ def with_own_sines(function: ca.Function) -> ca.Function:
     given = [a.nonzeros() for a in arguments]
     results = [[ca.SX(0)] * function.nnz_out(i) for i in range(function.n_out())]
     work: list[Any] = [ca.SX(0)] * function.sz_w()
-    known: dict[int, tuple[ca.SX, ca.SX]] = {}  # which keeps the arguments, and so their hashes
+    known: dict[int, list[ca.SX]] = {}  # which keeps the arguments, and so their hashes
     for k, code in enumerate(codes):
         into, of = function.instruction_output(k), function.instruction_input(k)
         if code == ca.OP_CONST:
@@ -104,12 +110,11 @@ def with_own_sines(function: ca.Function) -> ca.Function:
         elif code in (ca.OP_SIN, ca.OP_COS):
             x = work[of[0]]
             if x.element_hash() not in known:
-                known[x.element_hash()] = sine_cosine(x)
+                known[x.element_hash()] = _both().call([x], True, False)
             work[into[0]] = known[x.element_hash()][code == ca.OP_COS]
-        elif len(of) == 1:
-            work[into[0]] = ca.SX.unary(code, work[of[0]])
         else:
-            work[into[0]] = ca.SX.binary(code, work[of[0]], work[of[1]])
+            compose = ca.SX.unary if len(of) == 1 else ca.SX.binary
+            work[into[0]] = compose(code, *(work[i] for i in of))
     made = [_filled(function.sparsity_out(i), row) for i, row in enumerate(results)]
     names = function.name_in(), function.name_out()
     return ca.Function(function.name(), arguments, made, *names, {"cse": True})

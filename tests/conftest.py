@@ -14,7 +14,7 @@ SLOW = Path(__file__).with_name("slow_tests.txt")
 that need about a second of a processor or more. `pytest -m ""` runs them."""
 
 # The same draws every time: a test that fails here fails everywhere.
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=60)
 settings.load_profile("repeatable")
 
 # Matrices here have at most some dozen rows: threads of BLAS would only wait for each other, in
@@ -72,8 +72,8 @@ from tests.shared_fixtures import (  # noqa: E402, F401
     compiled_once,
     compiler_of_its_own,
     emptied_temporary_folder,
-    fmus_of_a_room_unpacked_once,
     fmus_unpacked_once,
+    keeping,
     own_temporary_folder,
     shared_folder,
     stamped,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
@@ -14,6 +15,7 @@ import pytest
 
 import hapticlink as hl
 from hapticlink.commands import main
+from hapticlink.components import registry
 from hapticlink.components.component import Block, Component, Variable
 from hapticlink.fmus import lock
 from hapticlink.fmus.build_fmu import build
@@ -41,16 +43,9 @@ def own_temporary_folder(
 @pytest.fixture
 def emptied_temporary_folder(own_temporary_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """That folder, for a test that looks at what its runs leave there: no FMU stays unpacked."""
+    process_cache.trim(0)
     monkeypatch.setattr(shelf, "_keeping", 0)
     return own_temporary_folder
-
-
-@pytest.fixture(scope="module")
-def fmus_unpacked_once() -> Iterator[None]:
-    """Runs of a module of tests leave the FMUs of this project unpacked for the next one, as those
-    of a sweep do."""
-    with process_cache.keep_unpacked():
-        yield
 
 
 COMPILED = compiler._compile
@@ -107,19 +102,35 @@ def compiler_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 RUNNING = (
-    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/docs/", "tests/programs/"),
-    *("tests/reference/", "tests/studies/", "tests/visualization/"),
+    *("tests/analysis/", "tests/api/", "tests/commands/", "tests/components/", "tests/docs/"),
+    *("tests/programs/", "tests/reference/", "tests/sentences/", "tests/studies/"),
     *(f"tests/orchestrator/{room}/" for room in ("holds", "plan", "results", "run", "scene")),
-    *("tests/orchestrator/ssp/", "tests/orchestrator/system/"),
+    *("tests/orchestrator/ssp/", "tests/orchestrator/system/", "tests/visualization/"),
 )
 """Rooms of tests that run scenes for their numbers."""
 
 
+@pytest.fixture(scope="session")
+def keeping() -> Iterator[ExitStack]:
+    with ExitStack() as kept:
+        yield kept
+
+
 @pytest.fixture(scope="module", autouse=True)
-def fmus_of_a_room_unpacked_once(request: pytest.FixtureRequest) -> None:
-    """Loading its FMUs is half of a short run."""
-    if request.node.nodeid.startswith(RUNNING):
-        request.getfixturevalue("fmus_unpacked_once")
+def fmus_unpacked_once(request: pytest.FixtureRequest, keeping: ExitStack) -> None:
+    """Loading its FMUs is half of a short run: as in a sweep, those of one module of tests stay
+    unpacked for the next. Runs do not, nor do parts that it has registered, with which no run is
+    kept."""
+    for each in shelf._shelves:
+        each.clear()
+    for parts in registry._REGISTRIES:
+        for name in [*parts.origins]:
+            del parts[name], parts.origins[name]
+    process_cache.trim()
+    if not request.node.nodeid.startswith(RUNNING):
+        keeping.close()
+    elif not shelf.is_keeping():
+        keeping.enter_context(process_cache.keep_unpacked())
 
 
 def status(*arguments: object) -> int:

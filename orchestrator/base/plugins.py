@@ -11,7 +11,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -116,11 +116,11 @@ def _goes_on() -> Iterator[None]:
         os._exit = exit_at_once
 
 
+@cache  # it looks through all that is installed, and each run asks
 def _version(module: str) -> str | None:
     from importlib.metadata import PackageNotFoundError, version
 
     package = module.partition(".")[0]
-    try:
+    with suppress(PackageNotFoundError):
         return str(getattr(sys.modules[package], "__version__", None) or version(package))
-    except PackageNotFoundError:
-        return None
+    return None

@@ -7,7 +7,7 @@ from functools import cache
 
 import casadi as ca
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hapticlink.fmus.errors import UnknownOperation
@@ -110,11 +110,13 @@ def test_binary_at_special_values(name):
                 assert_same(got, expected, (name, a, b))
 
 
+@settings(max_examples=100)  # of nineteen functions
 @given(st.sampled_from(sorted(UNARY)), doubles)
 def test_unary(name, a):
     assert_same(*both(UNARY_FUNCTIONS[name], a), (name, a))
 
 
+@settings(max_examples=100)
 @given(st.sampled_from(sorted(set(BINARY) - {"fmin", "fmax"})), doubles, doubles)
 @example("pow", -0.0, -3.0)
 @example("div", -1.0, -0.0)

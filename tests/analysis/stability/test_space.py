@@ -95,7 +95,7 @@ def test_a_redundant_loop_is_judged_in_every_pose_as_in_that_alone():
     these would be slopes along the closures of the pose before."""
     options = {"haptics.rate": 128, "graphics.rate": 32, "linkage.gravity": [0.0, 0.0, 0.0]}
     scene = open_scene.load("closed-loop-bricard", options)
-    poses = choose_evenly_spaced(simulate_scene(scene), scene.linkage, 3)
+    poses = choose_evenly_spaced(simulate_scene(scene), scene.linkage, 2)
     hands = {"light touch": hands_in(POINT)["light touch"]}
     together, without = in_poses(scene, poses, hands, DRIFT, work=SharedWork())
     alone = [in_poses(scene, [pose], hands, DRIFT)[0][0] for pose in poses[1:]]

@@ -62,7 +62,8 @@ def test_of_equilibria_side_by_side_that_one_is_judged_in_which_the_scenes_own_r
     led: tuple[Pose, dict[str, Case]],
 ) -> None:
     pose, cases = led
-    run = hl.run("closed-loop-ideal", BESIDE | {"duration": 90.0, "stop_when": ""}, figures=False)
+    long = {"duration": 90.0, "stop_when": "", "packaging": "native"}
+    run = hl.run("closed-loop-ideal", BESIDE | long, figures=False)
     x = run["haptic_device.x_true"]
     assert pose.handle == pytest.approx(x[-1], abs=2e-5)
     assert np.linalg.norm(np.subtract(pose.handle, pose.point)[:2]) > 0.01

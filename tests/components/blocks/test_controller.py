@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.blocks.controller import controller
@@ -164,7 +164,6 @@ def test_a_part_left_out_leaves_nothing(spec, inputs, parameters, outputs):
     assert not component.states
 
 
-@settings(max_examples=60)
 @given(directions)
 def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     G = constraint_map(projector(vectors))
@@ -172,7 +171,6 @@ def test_constraint_map_is_symmetric_and_semidefinite(vectors):
     assert np.linalg.eigvalsh(G)[0] > -1e-14
 
 
-@settings(max_examples=60)
 @given(directions, pulls, pulls)
 def test_constraint_wrench_does_no_work_on_free_motion(vectors, pull, motion):
     P, S = projector(vectors), np.diag([1, 1, L])
@@ -192,7 +190,6 @@ def test_constraint_wrench_does_no_work_on_free_motion_at_any_scale():
         np.testing.assert_allclose(F_T[n], F_T[L], rtol=1e-8)
 
 
-@settings(max_examples=60)
 @given(pulls)
 def test_constraint_wrench_at_both_ends(pull):
     """No constrained direction: no wrench. All: the device's whole inertia, M_d pull."""

@@ -3,7 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from hapticlink.components.device import discretisation
@@ -45,7 +45,6 @@ def test_printed_trapezoid_does_not_integrate_a_constant():
 
 
 @pytest.mark.parametrize("rule", RULES)
-@settings(max_examples=60)
 @given(re=st.floats(-50, 50), im=st.floats(-50, 50), period=st.floats(1e-3, 0.5))
 def test_poles_go_where_the_map_says(rule, re, im, period):
     A = np.array([[re, im], [-im, re]])

@@ -61,7 +61,6 @@ wrenches = st.tuples(st.floats(-9, 9), st.floats(-9, 9), st.floats(-0.2, 0.2))
 twists = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-5, 5))
 
 
-@settings(max_examples=60)
 @given(workspace)
 def test_links_close_on_the_crank_ends_with_elbows_outward(pose):
     q, psi = angles(pose).ravel(), distal(pose).ravel()
@@ -80,7 +79,6 @@ def test_links_close_on_the_crank_ends_with_elbows_outward(pose):
     assert (turn * -left_right * toward > 0).all()
 
 
-@settings(max_examples=60)
 @given(workspace)
 def test_jacobian_is_the_derivative(pose):
     step = 1e-6
@@ -88,7 +86,6 @@ def test_jacobian_is_the_derivative(pose):
     np.testing.assert_allclose(jacobian(pose), np.hstack(numeric), atol=1e-7)
 
 
-@settings(max_examples=60)
 @given(workspace)
 def test_angles_do_not_jump_as_the_handle_turns(pose):
     turned = (*pose[:2], pose[2] + 2 * np.pi)
@@ -97,7 +94,6 @@ def test_angles_do_not_jump_as_the_handle_turns(pose):
     assert np.abs(angles(near) - angles(pose)).max() < 1e-5
 
 
-@settings(max_examples=60)
 @given(workspace, twists)
 def test_mass_matrix_is_that_of_the_moving_parts(pose, v):
     """v' M v = 2 T, with T from velocities of the parts by finite differences."""
@@ -126,7 +122,6 @@ def test_mass_matrix_is_that_of_the_moving_parts(pose, v):
     assert np.linalg.eigvalsh(M)[0] > 0
 
 
-@settings(max_examples=60)
 @given(workspace, twists)
 def test_rate_of_the_mass_matrix_less_2C_is_skew(pose, v):
     step = 1e-6
@@ -172,7 +167,6 @@ def test_the_default_device_fits_the_reported_motion():
     assert margin.min() > 0.03
 
 
-@settings(max_examples=60)
 @given(workspace, wrenches)
 @example((0.01, -0.02, 0.7), (9.0, -5.0, 0.1))
 @example((0.01, -0.02, 0.7), (0.9, -0.5, 0.01))
@@ -187,7 +181,6 @@ def test_torques_give_the_wrench_with_least_norm_or_saturate_in_its_direction(po
     )
 
 
-@settings(max_examples=60)
 @given(workspace, st.tuples(*[st.floats(-3.5e-3, 3.5e-3)] * 2, st.floats(-0.1, 0.1)))
 def test_pose_from_exact_angles(pose, off):
     """Two iterations from 5 mm and 0.1 rad away come within 1 % of a count, at any turn."""
@@ -197,7 +190,6 @@ def test_pose_from_exact_angles(pose, off):
     assert abs(error[2]) < 1e-3
 
 
-@settings(max_examples=60)
 @given(workspace, st.tuples(*[st.floats(-0.5, 0.5)] * 4))
 def test_pose_is_the_least_squares_one(pose, counts):
     """Angles that no pose has: the residual is normal to the columns of J_q."""
@@ -253,7 +245,6 @@ def test_motors_rub_against_their_rates(rates):
     np.testing.assert_allclose(found[fast], expected[fast], rtol=1e-6)
 
 
-@settings(max_examples=60)
 @given(workspace, twists, wrenches)
 def test_the_twin_of_a_file_is_the_twin_in_closed_form(pose, v, wrench):
     """Relative to the largest entry of each: M_d, C_d and c, J_q, angles, margins, stops,

@@ -38,7 +38,6 @@ def test_terms_meet_appendix_a(seed):
 def test_random_linkages_have_loops_of_every_number():
     seen = Counter()
 
-    @settings(max_examples=60)
     @given(linkages())
     def draw(drawn):
         linkage, _, _ = drawn

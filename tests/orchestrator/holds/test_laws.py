@@ -403,7 +403,6 @@ def test_matrices_are_those_of_lapack(name, matrix, seed, rows):
             np.testing.assert_allclose(found, expected, rtol=0, atol=max(atol, 1e-12))
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 10), st.integers(-12, 12))
 def test_a_matrix_without_negative_eigenvalues_stays_as_it_is(seed, n, power):
     """Jacobi's method finds eigenvectors that are orthonormal and belong to their eigenvalues: of

@@ -20,7 +20,7 @@ from tests.orchestrator.systems import with_coupling
 from tests.orchestrator.timelines import CAUSAL, fixed, scenes, varying
 
 Make = Callable[[Timeline, str], System]
-shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
+shared = settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 timelines = st.one_of(
     st.builds(
         fixed,

@@ -17,6 +17,7 @@ from hapticlink.orchestrator.system.build_system import build_system
 from hapticlink.visualization.figures import schematic
 
 AS_STATED = {"graphics.sync": "operational"}
+FULL = {"device.observer.law": "kalman", "controller.bias": "full", "device.motor.damping": 1.25e-5}
 LOCAL = {**AS_STATED, "local_model": True, "mechanism.integrator": "semi-implicit-euler"}
 
 
@@ -35,10 +36,10 @@ def texts(scene: str, options: tuple[tuple[str, Any], ...] = ()) -> Mapping[str,
 CASES = [
     ("device", "closed-loop", {}, "encoders", "closed-loop-ideal", {}),
     ("device", "closed-loop", {}, "Nicosia observer", "closed-loop-ideal", {}),
-    ("device", "closed-loop", {"device.observer.law": "kalman"}, "Kalman", "closed-loop", {}),
+    ("device", "closed-loop", FULL, "Kalman", "closed-loop", {}),
     ("device", "closed-loop-ideal", {}, "ideal sensing", "closed-loop", {}),
     ("device", "closed-loop", {}, "F_T", "closed-loop", {"controller.topology": False}),
-    ("device", "closed-loop", {"controller.bias": "full"}, "a_{bias}", "closed-loop", {}),
+    ("device", "closed-loop", FULL, "a_{bias}", "closed-loop", {}),
     ("simulation", "closed-loop", {}, "Baumgarte", "closed-loop-ideal", {}),
     ("inside-virtual-mechanism", "closed-loop", {}, "w_{stab}", "closed-loop-ideal", {}),
     ("inside-virtual-mechanism", "closed-loop-ideal", {}, "projection", "closed-loop", {}),
@@ -71,7 +72,7 @@ def test_a_drawing_says_where_signals_come_from_and_how_they_are_held() -> None:
 
 
 def test_no_line_is_wider_than_its_box() -> None:
-    said = texts("closed-loop", (("device.motor.damping", 1.25e-5),))["device"]
+    said = texts("closed-loop", tuple(FULL.items()))["device"]
     assert "motor_damping = 1.25e-05," in said
     lines = said[said.index("motor_damping") :].split("\n")
     assert max(len(line) for line in lines if "$" not in line) <= schematic.LETTERS
