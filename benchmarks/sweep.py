@@ -30,13 +30,16 @@ import fmpy
 import numpy as np
 from fmpy.fmi2 import FMU2Slave
 
+import hapticlink.analysis
+import hapticlink.orchestrator
+from benchmarks import code_version
 from benchmarks.page import Progress, load_average, system, table
 from benchmarks.rows import Rows
 from hapticlink.analysis.sweep import run_sweep
 from hapticlink.analysis.sweep.job import job
 from hapticlink.analysis.sweep.run_sweep import TOGETHER
 from hapticlink.orchestrator import open_scene
-from hapticlink.orchestrator.base import process, temporary_folders
+from hapticlink.orchestrator.base import interrupt, process, temporary_folders
 from hapticlink.orchestrator.base.blas_threads import one_blas_thread
 from hapticlink.orchestrator.fmi import process_cache
 from hapticlink.orchestrator.run.compiled import lanes
@@ -85,7 +88,7 @@ PARAMETERS = {
 
 def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes points.csv into `folder`."""
-    (folder / "points.csv").unlink(missing_ok=True)
+    code_version.begin(folder, ("points.csv",), hapticlink.orchestrator, hapticlink.analysis)
     rows = Rows(folder / "points.csv", COLUMNS, 2)
     rounds, count = (1, TOGETHER) if quick else (ROUNDS, POINTS)
     process.raise_gc_threshold()
@@ -101,6 +104,7 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
             jobs = [job(source, [*FIXED, *o], p) for o, p in zip(options, points, strict=True)]
             together = partial(run_sweep.run_together, compiles=True)
             for row in run_sweep.work_together(jobs, room, run_sweep.run, together):
+                interrupt.raise_if_interrupted()
                 assert row["end"] == "duration", row
 
         def kept(points: list[Point], at_once: int) -> tuple[float, float]:
@@ -118,6 +122,8 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
         }
         for i, key in enumerate(KEYS):
             progress(key, i, len(KEYS))
+            if (key, "sweep") in rows:
+                continue
             found: dict[str, list[tuple[float, float]]] = {form: [] for form in forms}
             for turn in range(rounds):
                 draw = random.Random(turn)
@@ -129,7 +135,8 @@ def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
                 if each:
                     point, inside = (median(found) for found in zip(*each, strict=True))
                     rows.add(key, form, point, inside if form != "FMPy" else "")
-    rows.add("imports", "a worker", _imports(), "")
+    if ("imports", "a worker") not in rows:
+        rows.add("imports", "a worker", _imports(), "")
     return _page([*rows.rows.values()], command, load)
 
 

@@ -20,6 +20,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import hapticlink.analysis
+import hapticlink.commands
+import hapticlink.orchestrator
+import hapticlink.visualization
+from benchmarks import code_version
 from benchmarks.page import Progress, load_average, system, table
 from benchmarks.rows import Rows
 from hapticlink.orchestrator.base import temporary_folders
@@ -79,13 +84,16 @@ class Taken:
 
 def bench(folder: Path, quick: bool, progress: Progress, command: str) -> str:
     """Writes waiting.csv into `folder`."""
-    (folder / "waiting.csv").unlink(missing_ok=True)
+    packages = hapticlink.orchestrator, hapticlink.analysis, hapticlink.visualization
+    code_version.begin(folder, ("waiting.csv",), *packages, hapticlink.commands)
     rows = Rows(folder / "waiting.csv", COLUMNS, 1)
     after = str(Path(sys.executable).with_name("hapticlink"))
     both = [os.environ.get(BEFORE, ""), after]
     items = [*_items(quick)]
     for k, (what, arguments) in enumerate(items):
         progress(what, k, len(items))
+        if (what,) in rows:
+            continue
         rows.add(what, *_measured(arguments, both, 1 if quick else ROUNDS))
     shown = [[row[column] or "-" for column in COLUMNS] for row in rows.rows.values()]
     heads = "what | before (s) | after (s) | beside a busy neighbour | equilibria, slopes, products"
