@@ -8,7 +8,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -58,17 +59,17 @@ class Served:
         self.process.kill()
         self.process.communicate()
 
-    def window(self, origin: str | None = None) -> Window:
+    @contextmanager
+    def window(self, origin: str | None = None) -> Iterator[Window]:
         """A websocket like that of a page."""
         own = f"http://127.0.0.1:{self.port}"
-        return Window(
-            connect(
-                f"ws{self.url[4:]}run",
-                origin=Origin(origin or own),
-                proxy=None,
-                max_queue=None,  # frames that no test reads
-            )
-        )
+        with connect(
+            f"ws{self.url[4:]}run",
+            origin=Origin(origin or own),
+            proxy=None,
+            max_queue=None,  # frames that no test reads
+        ) as socket:
+            yield Window(socket)
 
     def end(self) -> tuple[int, str]:
         """Ctrl-C; the exit status and what was printed after the address."""
@@ -82,12 +83,6 @@ class Window:
 
     def __init__(self, socket: ClientConnection) -> None:
         self.socket, self.newest = socket, dict[str, Any]()
-
-    def __enter__(self) -> Window:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.socket.close()
 
     def send(self, **message: Any) -> None:
         self.socket.send(json.dumps(message))

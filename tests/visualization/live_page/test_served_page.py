@@ -54,8 +54,8 @@ def test_every_file_of_the_page_is_served(served: Served) -> None:
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "http://127.0.0.1:1", "null"])
 def test_other_origins_are_refused(served: Served, origin: str) -> None:
-    with pytest.raises(InvalidStatus, match="403"):
-        served.window(origin)
+    with pytest.raises(InvalidStatus, match="403"), served.window(origin):
+        pass
 
 
 def test_the_server_listens_on_this_machine_alone(served: Served) -> None:
@@ -156,8 +156,8 @@ def test_ctrl_c_ends_everything(tmp_path: Path) -> None:
     with page.window() as window:
         window.until(lambda new: "controls" in new)
         assert page.end()[0] == 0
-    with pytest.raises(ConnectionRefusedError):
-        page.window()
+    with pytest.raises(ConnectionRefusedError), page.window():
+        pass
 
 
 def test_a_port_in_use_is_told(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
