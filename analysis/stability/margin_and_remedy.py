@@ -65,7 +65,7 @@ class Margin:
     """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
     logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) of the forces of the controllers, in whole haptic periods: with one
+    """The further delay (s) in the controllers, in whole haptic periods: with one
     more it is unstable. None, too, where it is unstable with none."""
     rate: float | None
     """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
@@ -187,8 +187,8 @@ class _Search:
         return largest_count(holds, own, SLOWEST)
 
     def _stable(self, place: RestingScene, scale: float = 1.0, late: int = 0) -> bool:
-        """Whether all hands are stable with gains scaled, and the forces of the controllers some
-        haptic periods later."""
+        """Whether all hands are stable with gains scaled, and controllers that compute with what
+        they read some haptic periods before."""
         self._steps.tell(
             f"margin of delay: {late} haptic periods"
             if late

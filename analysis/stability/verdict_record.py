@@ -243,7 +243,7 @@ class Stability:
             least = f"down to times {2.0**-DOUBLINGS:.1g}"
             yield some if margin.stiffness else f"stable with no stiffnesses tried, {least}"
         if margin.delay is not None:
-            what = "further delay of the controller's forces"
+            what = "further delay in the controller"
             some = told("delay", "", f"{_within(1e3 * margin.delay, 3)} ms of {what}")
             yield some if margin.delay else f"less than a haptic period of {what}"
         if margin.rate is not None:

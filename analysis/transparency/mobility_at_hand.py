@@ -36,7 +36,7 @@ from hapticlink.analysis.stability.modes import DRIFT
 from hapticlink.analysis.stability.port_response import hand_port, response
 from hapticlink.analysis.stability.poses import Pose, choose_evenly_spaced, fault_of, simulate_scene
 from hapticlink.analysis.stability.resting_scene import RestingScene, resting
-from hapticlink.analysis.stability.short_hyperperiod import whole_frames
+from hapticlink.analysis.stability.short_hyperperiod import short as short_hyperperiod
 from hapticlink.analysis.stability.stand_in import StandIn, find_stand_ins, record_stand_ins
 from hapticlink.analysis.tune.felt_stiffness import CONSTRAINED, RIGID, mobility
 from hapticlink.analysis.tune.stability_limits import Judge
@@ -98,7 +98,7 @@ class Transparency:
     """How a scene feels at a pose of its run. growing: the cases, of a handle that is let go and of
     the hands of `stability`, in which something grows by more than a drift; steady_in: the hands in
     which nothing does. stand_ins: what stands for FMUs whose state cannot be read. rounded: which
-    graphics rate is judged in place of one whose frames are no whole haptic periods."""
+    graphics rate is judged in place of one with which events hardly repeat."""
 
     title: str
     pose: str
@@ -197,14 +197,14 @@ def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
     """How a scene feels at `count` poses of its own run, held there by a spring that is cut off
-    again, with `whole_frames`. Raises InputFault for a scene without device,
+    again. Raises InputFault for a scene without device,
     controller or linkage, and where no pose has an equilibrium."""
     read = open_scene.load(scene, options)
-    poses, (whole, rounded) = _visit_poses(read, count), whole_frames(read)
+    poses, (judged, rounded) = _visit_poses(read, count), short_hyperperiod(read)
     found, why = [], ""
     for pose in poses:
         try:
-            with resting(whole, pose.held, at=pose.start) as place:
+            with resting(judged, pose.held, at=pose.start) as place:
                 felt = _measure_felt(read, place, pose.name, {})
                 found.append(replace(felt, rounded=rounded))
         except (InputFault, FmuFault) as fault:
@@ -332,8 +332,8 @@ def costs(
     found = []
     for name, change in changes.items():
         try:
-            whole, rounded = whole_frames(open_scene.load(read, change))
-            with resting(whole, pose.held, at=pose.start) as place:
+            judged, rounded = short_hyperperiod(open_scene.load(read, change))
+            with resting(judged, pose.held, at=pose.start) as place:
                 cost = _cost(read, place, name)
                 found.append(replace(cost, felt=replace(cost.felt, rounded=rounded)))
         except (InputFault, FmuFault) as fault:

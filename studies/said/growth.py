@@ -105,9 +105,10 @@ def hertz(run: Any, step: float) -> float:
     return (len(changes) - 1) / 2 / float(time[changes[-1]] - time[changes[0]])
 
 
-def growth_of(run: Any, step: float, told: float) -> Growth:
-    """The growth rate of a run of which a rate is told, in changes over `step` (s)."""
-    d = _changes(run, step)
+def growth_of(run: Any, step: float, told: float, block: str = "") -> Growth:
+    """The growth rate of a run of which a rate is told, in changes over `step` (s) of what is seen
+    of a `block`, or of all."""
+    d = _changes(run, step, block)
     found = _fit(d, step, told)
     return _fit(np.diff(d, axis=0), step, told) if found.why else found
 
@@ -142,10 +143,12 @@ def _fit(d: Array, step: float, told: float) -> Growth:
     return Growth(rates[1], abs(rates[0] - rates[1]), turn, step)
 
 
-def _changes(run: Any, step: float) -> Array:
+def _changes(run: Any, step: float, block: str) -> Array:
     """The changes over each step, (k, phases and coordinates)."""
     columns = []
     for name, scale in SCALES.items():
+        if not name.startswith(block):
+            continue
         time, y = run.time(name), run[name]
         n = step / float(np.median(np.diff(time))) if len(time) > 2 else 0.0
         if n < 0.999 or abs(n - round(n)) > 1e-6 or len(y) < round(n):

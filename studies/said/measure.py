@@ -26,8 +26,8 @@ LEAST, SLIGHT = 0.002, 0.01
 """The same (1/s), of rates that are nearly 0; and what grows by less than the second is marginal by
 the words of `stability`."""
 FAR = 1e-5
-"""Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift. Looked
-at is the second half of a run: with other gains, whose rest is not told, it begins beside it."""
+"""Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift. With
+other gains, whose rest is not told, a run begins beside it: the difference of two does not."""
 OWN = "free", "the scene's own damper"
 LEFT_OUT = "interpolation", "timing"
 Row = dict[str, Any]
@@ -217,7 +217,8 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
     of its nudge (Odd); one that shows less may leave out a mode: a last one begins otherwise, and
     is longer. Frames of different lengths contradict nothing (FOLDS), but agree where there are too
     few hyperperiods: of -1.861 1/s, whose hyperperiod is 1 s, seed 4900623 shows -2.03 +- .16 by
-    these, and -1.8608 by frames."""
+    these, and -1.8608 by frames. A mode of the handle may be faint beside what the mechanism shows:
+    in a firm grip seed 5400104 grows at .0021 1/s by all, and at the told .0196 by the handle."""
     told, hand = case["growth_rate"], scene.record["hands"][case["hand"]]
     step = scene.step(told, {})
     row = f"{case['hand']} at {case['pose']} (1/s)", told
@@ -230,9 +231,12 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
     for again in range(len(NUDGES)):
         run, seen = scene.run(case["pose"], hand, told, {}, again)
         says, why = compare(case, run)
-        if says != "agree" and seen is not None and frame != step and abs(told) * frame < 1.0:
-            by_frames = compare(case, growth_of(seen, frame, told))
-            says, why = by_frames if by_frames[0] == "agree" else (says, why)
+        if says != "agree" and seen is not None:
+            others = [growth_of(seen, step, told, "haptic_device")]
+            if frame != step and abs(told) * frame < 1.0:
+                others.append(growth_of(seen, frame, told))
+            agree = (each for each in (compare(case, o) for o in others) if each[0] == "agree")
+            says, why = next(agree, (says, why))
         if says == "agree" or (again and says == "contradicted" and run.rate > told):
             break
     if says == "contradicted" and not whole:
@@ -256,8 +260,10 @@ def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
         if ended.fault:
             return True
         size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
-        if size[len(size) // 2 :].max() > FAR and not again:
-            return True
+        if size.max() > FAR:
+            if again:
+                return True
+            continue
         if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
             least = 2.2 * slow if case["verdict"] == "marginal" else 0.0
             return run.rate > max(SLIGHT, least) and not _drifts(run.rate, hertz(ended, run.step))
@@ -269,12 +275,21 @@ def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
     return None
 
 
+def _begins_beside(scene: Checked, case: Row, changes: Row) -> bool:
+    """Whether with changes the told equilibrium is none, so that what moves there is not small."""
+    hand = scene.record["hands"][case["hand"]]
+    _, ended = scene.run(case["pose"], hand, 1.0, changes, 0)
+    return bool(np.abs(np.diff(ended["virtual_mechanism.q"][:20], axis=0)).max() > FAR)
+
+
 def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str]:
     """Whether something grows in the worst pose in some of at most so many hands with changes."""
     pose, clean = scene.record["worst"]["pose"], True
     cases = [c for c in scene.record["cases"] if c["pose"] == pose and c["hand"] not in OWN]
     for case in sorted(cases, key=lambda c: -c["growth_rate"])[:most]:
         if grows := _grows(scene, case, changes):
+            if most < len(cases) and _begins_beside(scene, case, changes):
+                return None, f"{case['hand']} grows, but begins beside its rest"
             return True, f"{case['hand']} grows"
         clean = clean and grows is False
     return (False, "none grows") if clean else (None, "not clean in some hand")

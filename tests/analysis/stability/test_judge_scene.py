@@ -241,18 +241,18 @@ def test_of_cases_that_differ_by_rounding_the_first_is_the_worst() -> None:
         ),
         (
             Margin(1.29, 0.0, 30.0),
-            "stiffnesses times 1.2, less than a haptic period of further delay of the controller's "
-            "forces, graphics down to 30 Hz in whole haptic periods",
+            "stiffnesses times 1.2, less than a haptic period of further delay in the controller, "
+            "graphics down to 30 Hz in whole haptic periods",
         ),
         (
             Margin(8.77, 0.001953125, 512 / 35),
-            "stiffnesses times 8.7, 1.95 ms of further delay of the controller's forces, "
+            "stiffnesses times 8.7, 1.95 ms of further delay in the controller, "
             "graphics down to 14.7 Hz in whole haptic periods",
         ),
         (
             Margin(1024.0, 0.015625, 8.0, ("stiffness", "delay", "rate")),
             "stiffnesses at least times 1000 (not searched further), "
-            "at least 15.6 ms of further delay of the controller's forces (not searched further), "
+            "at least 15.6 ms of further delay in the controller (not searched further), "
             "graphics at least down to 8 Hz in whole haptic periods (not searched further)",
         ),
     ],
