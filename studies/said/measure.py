@@ -348,6 +348,8 @@ def _margins(scene: Checked) -> Iterator[Claim]:
         if (below[0], above[0]) == (False, True):
             says = "agree"
         why = f"at {inside:.4g}: {below[1]}; at {outside:.4g}: {above[1]}"
+        if name == "delay" and says == "contradicted" and options["hold"] == "model":
+            says, why = "undecided", f"{why}; `model` takes the age of what comes late into account"
         yield f"margin of {name}", told, says, why
 
 
