@@ -29,6 +29,9 @@ FLOOR, LARGE = {True: 1e-14, False: 2e-12}, {True: 1e-5, False: 1e-4}
 grows or decays: what is quadratic in a growing one grows twice as fast; what has decayed by four
 decades may end in a larger rounding. The handle's angle in seed 4900623 is rounded by 3e-14 rad: of
 -0.436 1/s fits of its 26 hyperperiods down to 5e-13 show -0.08 and -0.20, down to 2e-12 -0.436."""
+RISE = 1e-11, 1e-6
+"""Changes of the handle in a tick (m, rad) between which what grows fast is neither rounding nor
+large."""
 CREEP = 0.01
 """Rate (1/s) below which, and below a tenth of what is told, a mode is a creep of the rest."""
 EVEN = 0.005
@@ -111,6 +114,25 @@ def growth_of(run: Any, step: float, told: float, block: str = "") -> Growth:
     d = _changes(run, step, block)
     found = _fit(d, step, told)
     return _fit(np.diff(d, axis=0), step, told) if found.why else found
+
+
+def growth_by_ticks(run: Any) -> Growth:
+    """Of what grows beyond all that a step could show: the slope of the logarithm of the handle's
+    changes in a tick, while they RISE, and how far those of both halves differ. Seed 5500203 grows
+    by 8.8 over a frame: by frames its runs show how they calm down afterwards, by ticks the told
+    282 1/s."""
+    time, y = run.time("haptic_device.x_true"), run["haptic_device.x_true"]
+    size = np.abs(np.diff(y, axis=0)).max(axis=1)
+    end = int(np.argmax(size > RISE[1]))
+    begin = max(np.flatnonzero(size[:end] < RISE[0]) + 1, default=0)
+    if end - begin < 4 * FEWEST:
+        return Growth(why=f"{end - begin} ticks between rounding and large motions")
+    middle = (begin + end) // 2
+    whole, early, late = (
+        float(np.polyfit(time[i:j], np.log(size[i:j]), 1)[0])
+        for i, j in ((begin, end), (begin, middle), (middle, end))
+    )
+    return Growth(whole, abs(early - late), step=0.0)
 
 
 def _fit(d: Array, step: float, told: float) -> Growth:

@@ -12,7 +12,16 @@ import numpy as np
 
 import hapticlink as hl
 from hapticlink.orchestrator.scene.overrides import parse
-from studies.said.growth import SCALES, Growth, Odd, growth_of, hertz, hyperperiod, step_of
+from studies.said.growth import (
+    SCALES,
+    Growth,
+    Odd,
+    growth_by_ticks,
+    growth_of,
+    hertz,
+    hyperperiod,
+    step_of,
+)
 
 NUDGES = (np.array([1.0, -0.7, 5.0]),) * 2 + (np.array([-0.4, 1.0, -3.0]),)
 """Of the hand, in its three directions (m, m, rad), of a run and of the next ones, which are seen
@@ -226,7 +235,7 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
         return *row, "undecided", "motors at their limit, which any motion takes them off"
     whole = step == hyperperiod(scene.haptic, scene.graphics)
     frame = step_of(scene.haptic, scene.graphics, math.inf)
-    if abs(told) * step > 1.0 and not whole:
+    if abs(told) * step > 1.0 and not whole and told < 0.0:
         return *row, "undecided", "too fast for frames of different lengths"
     for again in range(len(NUDGES)):
         run, seen = scene.run(case["pose"], hand, told, {}, again)
@@ -235,6 +244,8 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
             others = [growth_of(seen, step, told, "haptic_device")]
             if frame != step and abs(told) * frame < 1.0:
                 others.append(growth_of(seen, frame, told))
+            if told * step > 1.0:
+                others.append(growth_by_ticks(seen))
             agree = (each for each in (compare(case, o) for o in others) if each[0] == "agree")
             says, why = next(agree, (says, why))
         if says == "agree" or (again and says == "contradicted" and run.rate > told):
