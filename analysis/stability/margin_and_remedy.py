@@ -53,6 +53,9 @@ DAMPINGS = (0.5, 2.0)
 FASTER = (2, 4)
 """Factors on rates that are tried."""
 MARGINS = "stiffness", "delay", "rate"
+UNSURE = 0.1
+"""Uncertainty (1/s) of the growth rate of a marginal case, next to a singular pose, from which on
+no limit of stability is searched: what is found there is rounding's."""
 TRIED = 3
 """Remedies that are judged in all poses."""
 
@@ -76,6 +79,8 @@ class Margin:
     alone: float = 0.0
     """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
     where it is no more than a drift."""
+    unsure: float = 0.0
+    """The uncertainty (1/s) of growth rates there, where it is why nothing was searched."""
 
 
 def improvements(
@@ -92,6 +97,8 @@ def improvements(
     """The margin in the `pose` of the `worst` case, and what ends its instability or grows less, as
     `remedies`; nothing where it is stable. visited: gives the poses in which the scene with other
     options is judged, those that are named in `hardest` first."""
+    if worst.verdict == "marginal" and worst.uncertainty > UNSURE:
+        return Margin(None, None, None, unsure=worst.uncertainty), ()
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
     search = _Search(read, pose, held, bounds, work or SharedWork(), steps or Steps(None, 0))

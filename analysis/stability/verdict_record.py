@@ -238,6 +238,9 @@ class Stability:
                 return f"{what}at least {value} (not searched further)"
             return f"{what}{value}"
 
+        if margin.unsure:
+            yield f"not searched, as growth rates there are uncertain by {margin.unsure:.2g} 1/s"
+            return
         if margin.stiffness is not None:
             some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")
             least = f"down to times {2.0**-DOUBLINGS:.1g}"

@@ -345,6 +345,20 @@ def test_a_margin_leaves_drifts_aside(slider: hl.Scene, monkeypatch: pytest.Monk
     assert next(Stability._below(told)) == "margin at 0 s (drifts aside): half"
 
 
+@pytest.mark.parametrize(("uncertainty", "searched"), [(0.05, True), (2.0, False)])
+def test_no_margin_is_searched_where_growth_rates_are_uncertain(
+    slider: hl.Scene, uncertainty: float, searched: bool
+) -> None:
+    """Next to a singular pose rounding decides what grows."""
+    poses = choose_evenly_spaced(simulate_scene(slider), slider.linkage, 1)
+    case = Case("0 s", "firm grip", 0.02, uncertainty, 1.2, "oscillation", "marginal", ())
+    firm = {"firm grip": HANDS["firm grip"]}
+    margin, _ = improvements(slider, poses[0], firm, DRIFT, case, lambda _: (poses, ""))
+    assert (margin.stiffness is not None) == searched
+    told = ", ".join(Stability._margins(Mock(margin=margin)))
+    assert (told == "not searched, as growth rates there are uncertain by 2 1/s") == (not searched)
+
+
 SLIDER = """
 title = "Slider"
 duration = 0.1
