@@ -145,10 +145,9 @@ def hardest_first(cases: Iterable[Case]) -> list[str]:
 
 
 class InHands:
-    """A scene at rest in a pose, with the gains multiplied by `scales` and
-    controllers that compute with what they read, behind the holds, `late` of their steps before;
-    for the hand None the scene's own stays. Raises
-    InputFault or FmuFault where it has no equilibrium."""
+    """A scene at rest in a pose, with the gains multiplied by `scales` and controllers that compute
+    with what they read, behind the holds, `late` of their steps before; for the hand None the
+    scene's own stays. Raises InputFault or FmuFault where it has no equilibrium."""
 
     def __init__(self, place: RestingScene, scales: Scales | None = None, late: int = 0) -> None:
         period = place.period(scales or {})

@@ -55,7 +55,7 @@ FASTER = (2, 4)
 MARGINS = "stiffness", "delay", "rate"
 UNSURE = 0.1
 """Uncertainty (1/s) of the growth rate of a marginal case, next to a singular pose, from which on
-no limit of stability is searched: what is found there is rounding's."""
+no limit of stability is searched: rounding would decide it."""
 TRIED = 3
 """Remedies that are judged in all poses."""
 
@@ -68,8 +68,8 @@ class Margin:
     """The factor on all stiffnesses, dampings by its root, up to which it is stable, to FINE of its
     logarithm; 0 where it is unstable with all that were tried."""
     delay: float | None
-    """The further delay (s) in the controllers, in whole haptic periods: with one
-    more it is unstable. None, too, where it is unstable with none."""
+    """The further delay (s) in the controllers, in whole haptic periods: with one more it is
+    unstable. None, too, where it is unstable with none."""
     rate: float | None
     """The lowest graphics rate (Hz) down to which it is stable with frames of whole haptic periods:
     with frames a period longer it is unstable. Infinite where it is with all that were tried."""

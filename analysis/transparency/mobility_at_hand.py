@@ -197,8 +197,8 @@ def transparency(
     scene: str | Path | Scene, options: Sequence[str] = (), *, count: int = 2
 ) -> list[Transparency]:
     """How a scene feels at `count` poses of its own run, held there by a spring that is cut off
-    again. Raises InputFault for a scene without device,
-    controller or linkage, and where no pose has an equilibrium."""
+    again. Raises InputFault for a scene without device, controller or linkage, and where no pose
+    has an equilibrium."""
     read = open_scene.load(scene, options)
     poses, (judged, rounded) = _visit_poses(read, count), short_hyperperiod(read)
     found, why = [], ""

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import jsonschema
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hapticlink.commands.json_schema import json_schema
@@ -174,6 +174,7 @@ def validator():
     return jsonschema.Draft202012Validator(json_schema())
 
 
+@settings(max_examples=150)
 @given(st.data())
 def test_numbers_of_shipped_scenes_out_of_range(data):
     name = data.draw(st.sampled_from(SCENES), "scene")
