@@ -9,7 +9,7 @@ it finds no stiffness of a hand: `half-lead`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from dataclasses import replace
 
 from hapticlink.analysis.stability.state_vector import StateEntry
@@ -24,8 +24,9 @@ NEXT_TO_NOTHING = 1e-18
 TAKEN_OUT, AS_AT_REST = "taken out", "as at the equilibrium"
 NEXT_TO_REST = "as half-lead, its law for motions far below 10 um in a step: larger ones may decay"
 """What becomes of a nonlinearity, at the end of its line."""
+COUNT = "fmu", "n_constrained"
 DISCRETE = {
-    ("fmu", "n_constrained"),
+    COUNT,
     ("fmu", "turns"),
     ("fmu", "deflection"),
     ("fmu", "contact_deflection"),
@@ -119,7 +120,7 @@ def name_by_end(lines: Sequence[str]) -> str:
     return "; ".join(parts)
 
 
-def discrete(coordinate: StateEntry) -> bool:
+def discrete(coordinate: StateEntry, of: Container[tuple[str, str]] = DISCRETE) -> bool:
     """Whether a coordinate is a switch or belongs to what is taken out."""
     variable = coordinate.variable.partition("[")[0].rpartition(".")[2]  # left.n_constrained
-    return (coordinate.kind, variable) in DISCRETE
+    return (coordinate.kind, variable) in of

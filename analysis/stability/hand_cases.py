@@ -43,7 +43,12 @@ from hapticlink.orchestrator.scene.scene import Scene
 SHARES = 3
 SLIGHT = 0.01
 """Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
+NOWHERE = "divergence within 5 mm"
+"""What a hand is marginal by whose divergence leads nowhere (`Pose.leaves`), and which margins
+leave out."""
 TWICE = 2.0
+SURELY = 2.0
+"""Uncertainties by which a mode is past what is slight or slow, before a limit is found by it."""
 TIE = 1e-6
 """Difference of growth rates, relative to the larger and SLIGHT at least, up to which they are the
 same: which of them rounding makes the larger decides nothing."""
@@ -167,18 +172,21 @@ class InHands:
     ) -> float:
         """The largest growth rate (1/s) in all hands, or the first one that is positive. Drifts do
         not count, nor what is marginal and grows slightly, or less than TWICE as fast as is `slow`
-        in that hand."""
-        largest = -np.inf
+        in that hand. Raises InputFault where none grows, but rounding decides whether one does."""
+        largest, unsure = -np.inf, 0.0
         for hand in hands.values():
             mode, period, _ = self._leading(hand)
-            growth = mode.growth
+            growth, least = mode.growth, max(SLIGHT, TWICE * slow(hand))
             unstable = self._verdict(mode) == "unstable"
-            if unstable or (growth > SLIGHT and growth > TWICE * slow(hand)):
-                hertz = period.traced(mode).omega / (2 * np.pi)
-                if kind(growth, hertz, bounds) != "drift":
-                    return growth
-            else:
+            if not unstable and growth <= least:
                 largest = max(largest, min(growth, -SLIGHT))
+            elif kind(growth, period.traced(mode).omega / (2 * np.pi), bounds) != "drift":
+                apart = np.expm1(least * self._seconds) + SURELY * mode.uncertainty
+                if verdict(abs(mode.z), apart) == "unstable":
+                    return growth
+                unsure = max(unsure, growth)
+        if unsure:
+            raise InputFault(f"whether a hand grows at {unsure:.2g} 1/s is uncertain")
         return largest
 
     def slow(self, hand: Hand | None) -> float:
@@ -235,10 +243,11 @@ def in_poses(
     begin: Callable[[str], object] = lambda pose: None,
     work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
-    """The cases in all poses, each of which `begin` is told, and by pose why it has none."""
+    """The cases in all poses, each of which `begin` is told, and by pose why it has none. A pose in
+    which the number of constrained directions depends on what was before is judged with each."""
     cases: list[Case] = []
     without: dict[str, str] = {}
-    for pose in poses:
+    for pose in (left := [*poses]):
         begin(pose.name)
         try:
             with at_pose(read, pose, hands.keys() != {UNHELD}, work=work) as (place, pressed):
@@ -253,6 +262,7 @@ def in_poses(
                 assert read.linkage is not None
                 at = pressed.at_equilibrium(place, read.linkage)
                 cases += [replace(case, saturated=saturated, at=at) for case in there]
+                left += at.counted_otherwise(place, read.directions)
         except (InputFault, FmuFault) as fault:
             without[pose.name] = str(fault)
     return cases, without

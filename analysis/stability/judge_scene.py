@@ -19,7 +19,7 @@ import numpy as np
 
 from hapticlink.analysis.search.acceptance import broken_limit
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.hand_cases import hardest_first, in_poses, worst_case
+from hapticlink.analysis.stability.hand_cases import NOWHERE, hardest_first, in_poses, worst_case
 from hapticlink.analysis.stability.hands import (
     FREE,
     OWN,
@@ -226,14 +226,15 @@ def _judge(
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium is found in any pose, at {name}: {why}")
+        named |= {case.pose: case.at for case in cases if case.at and case.at.counted}
         worst = worst_case(cases)
         while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
             if named[worst.pose].leaves(short_read, hands[worst.hand]):
                 break
-            cases[cases.index(worst)] = replace(worst, verdict="marginal")
+            cases[cases.index(worst)] = replace(worst, verdict="marginal", kind=NOWHERE)
             worst = worst_case(cases)
         there = [case for case in cases if case.pose == worst.pose]
-        near = {c.hand for c in there if c.kind == "divergence" and c.verdict == "marginal"}
+        near = {c.hand for c in there if c.kind == NOWHERE}
         held = {name: hand for name, hand in hands.items() if name not in near} or hands
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         hardest = hardest_first(cases)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hapticlink.analysis.stability.forward_sensitivity import Applied, ForwardSensitivity, Key
-from hapticlink.analysis.stability.frozen_nonlinearities import discrete, without_friction
+from hapticlink.analysis.stability.frozen_nonlinearities import COUNT, discrete, without_friction
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.analysis.stability.stand_in import with_stand_ins
 from hapticlink.analysis.stability.state_vector import StateEntry, StateVector
@@ -24,7 +24,15 @@ from hapticlink.orchestrator.base.arrays import Vector
 from hapticlink.orchestrator.base.errors import InputFault
 from hapticlink.orchestrator.base.ticks import Clock, Frames, Timeline
 from hapticlink.orchestrator.fmi.variables import Scalar
-from hapticlink.orchestrator.plan.operations import Event, Instruction, OfFmu, OfHold, Repeat
+from hapticlink.orchestrator.plan.operations import (
+    Event,
+    Instruction,
+    OfFmu,
+    OfHold,
+    Repeat,
+    Step,
+    flat,
+)
 from hapticlink.orchestrator.plan.plan import Plan
 from hapticlink.orchestrator.results.run_results import RunResults
 from hapticlink.orchestrator.run.compiled.operation_records import Machine
@@ -226,6 +234,23 @@ class LiftedMap:
             for _, event in self._moments
             for operation in event.operations
         )
+
+    @cached_property
+    def counts(self) -> list[int]:
+        """The coordinates that are numbers of constrained directions."""
+        return [i for i, c in enumerate(self.coordinates) if discrete(c, {COUNT})]
+
+    def counted(self, point: Vector, before: float) -> Vector:
+        """The numbers of constrained directions that FMUs count in their next steps from a state at
+        rest, where they had counted `before`."""
+        state = point.copy()
+        state[self.counts] = before
+        self._state.put(self._template, state)
+        each = (o for kind in self._known for o in flat(self._plan.block(kind)))
+        steps = {o.fmu: o for o in each if isinstance(o, Step)}
+        for fmu in {self.coordinates[i].owner for i in self.counts}:
+            self._machine.joined([steps[fmu]])(self._moments[0][0])
+        return self._state.now()[self.counts]
 
     def outputs(self, fmu: str) -> slice:
         """The indices of an FMU's outputs in the signal vector."""

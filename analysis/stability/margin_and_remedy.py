@@ -75,7 +75,7 @@ class Margin:
     with frames a period longer it is unstable. Infinite where it is with all that were tried."""
     not_searched_further: tuple[str, ...] = ()
     """The quantities that are stable as far as they were searched, or next to which no equilibrium
-    was found: at least these."""
+    was found, or rounding decides whether something grows: at least these."""
     alone: float = 0.0
     """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
     where it is no more than a drift."""
@@ -125,7 +125,8 @@ class _Search:
         self._work, self._steps = work, steps
         self._known: dict[tuple[str, ...], float] = {}
         self._without: set[tuple[str, float]] = set()
-        """Values, by quantity, with which no equilibrium was found: not known to be unstable."""
+        """Values, by quantity, with which no equilibrium was found, or only what grows within its
+        uncertainty: not known to be unstable."""
         self._own_place: RestingScene | None = None
         self._haptic = exact(self._read.haptics.rate)
 

@@ -27,7 +27,7 @@ from hapticlink.analysis.stability.smooth_scene import StartPose
 from hapticlink.analysis.stability.stand_in import find_stand_ins
 from hapticlink.components.port_space import PLANE, PortSpace
 from hapticlink.components.specs.hand import ConstantHand, Hand, HoldingHand
-from hapticlink.components.specs.linkage import Linkage
+from hapticlink.components.specs.linkage import Directions, Linkage
 from hapticlink.orchestrator.base import temporary_folders
 from hapticlink.orchestrator.base.arrays import Matrix, Vector
 from hapticlink.orchestrator.base.errors import Fault, FmuFault, InputFault
@@ -67,6 +67,7 @@ NEAR = 5e-3
 """Motions (m) up to which it leads nowhere, as to an equilibrium beside a singular pose."""
 PER_METRE = 10.0
 """Angles (rad) that are as far off as a length of 1 m, or as much moved."""
+FEWER, MORE = "fewer constrained", "more constrained"
 LIGHT = 0.25
 """The force (N) with which a hand presses where that of the run slides off, as from a corner or a
 disc along the spring that the coupling is."""
@@ -83,6 +84,8 @@ class Pose:
     press: tuple[float, ...]
     others: dict[str, tuple[float, ...]] = field(default_factory=dict)
     """The poses of the points that further users hold."""
+    touches: bool = False
+    """Whether the hand presses against something in that moment."""
     title: str = ""
     """What it is, instead of a moment."""
     space: PortSpace = PLANE
@@ -91,6 +94,11 @@ class Pose:
     """The pose of the handle, where that is not on the operational point."""
     found: str = ""
     """How, of a pose that is no moment."""
+    counted: str = ""
+    """Of a pose beside another one, which differs in the number of constrained directions alone:
+    FEWER or MORE."""
+    counting: dict[str, float] = field(default_factory=dict)
+    """Options of [directions] by which these are counted there, without hysteresis."""
 
     @property
     def start(self) -> StartPose:
@@ -106,11 +114,6 @@ class Pose:
         return replace(self, joints=joints, point=x, handle=handle or None, press=F)
 
     @property
-    def touches(self) -> bool:
-        """Whether the hand presses against something."""
-        return any(self.press) and not self.title
-
-    @property
     def lighter(self) -> Pose:
         """Pressed with LIGHT."""
         F = np.array(self.press)
@@ -118,7 +121,21 @@ class Pose:
 
     @property
     def name(self) -> str:
-        return self.title or f"{self.time:.3g} s" + (" (in contact)" if self.touches else "")
+        name = self.title or f"{self.time:.3g} s" + (" (in contact)" if self.touches else "")
+        return f"{name}, {self.counted}" if self.counted else name
+
+    def counted_otherwise(self, place: RestingScene, directions: Directions) -> Iterator[Pose]:
+        """This pose, in which a scene was found at rest, with as few and with as many constrained
+        directions as there can be by what was before, where these are others than it was found
+        with."""
+        if self.counted:
+            return
+        now, fewest, most = place.counts()
+        for word, number, factor in ((FEWER, fewest, 1.0), (MORE, most, directions.hysteresis)):
+            if (number != now).any():
+                tolerance = directions.rank_tolerance * factor
+                by = {"directions.rank_tolerance": tolerance, "directions.hysteresis": 1.0}
+                yield replace(self, counted=word, counting=by)
 
     def leaves(self, read: Scene, hand: Hand | None) -> bool:
         """Whether the run of a scene from this pose on, in a hand that stands still next to it,
@@ -134,7 +151,7 @@ class Pose:
     @property
     def started(self) -> dict[str, object]:
         """The options with which a scene starts at rest in this pose."""
-        return {"linkage.start": self.joints, "linkage.start_velocity": {}}
+        return {"linkage.start": self.joints, "linkage.start_velocity": {}, **self.counting}
 
     @property
     def held(self) -> dict[str, object]:
@@ -144,7 +161,7 @@ class Pose:
             f"hands.{u}": spring(x, no_force, FIRM, self.space) for u, x in self.others.items()
         }
         at = self.handle or self.point
-        return {"hand": spring(at, self.press, FIRM, self.space), **hands}
+        return {"hand": spring(at, self.press, FIRM, self.space), **hands, **self.counting}
 
 
 def simulate_scene(scene: str | Path | Scene, options: Options = ()) -> Results:
@@ -312,6 +329,7 @@ def _average(run: Results, linkage: Linkage, since: float) -> Pose:
         joints=by_joint(linkage, mean(table[JOINT_COORDINATES])),
         point=tuple(mean(table[POINT_POSE]).tolist()),
         handle=tuple(mean(device[HANDLE_POSE]).tolist()) if device else None,
+        touches=False,
     )
 
 
@@ -333,12 +351,14 @@ def _contact_force(table: Table, linkage: Linkage) -> Matrix:
 def _pose(run: Results, linkage: Linkage, i: int) -> Pose:
     table = _read_poses(run)
     users = [user for user in run.record.scene.get("devices", {}) if _point(user) in table]
+    force = _contact_force(table, linkage)[i]
     return Pose(
         float(table["time"][i]),
         by_joint(linkage, table[JOINT_COORDINATES][i]),
         tuple(table[POINT_POSE][i].tolist()),
-        tuple((0.0 - _contact_force(table, linkage)[i]).tolist()),
+        tuple((0.0 - force).tolist()),
         {user: tuple(table[_point(user)][i].tolist()) for user in users},
+        touches=bool(force.any()),
         space=linkage.space,
     )
 
@@ -357,7 +377,7 @@ def at_pose(
     there is none."""
     with ExitStack() as stack:
         try:
-            options = pose.held if held else {}
+            options = pose.held if held else pose.counting
             place = stack.enter_context(resting(read, options, start, pose.start, work))
             _require_touch(pose, place)
         except (InputFault, FmuFault):

@@ -93,6 +93,13 @@ class RestingScene:
         found: Vector = contact_force(self._linkage, F[None], gap if len(gap) else None)[0]
         return found
 
+    def counts(self) -> tuple[Vector, Vector, Vector]:
+        """The numbers of constrained directions at the `equilibrium`: as they are, the fewest and
+        the most that there can be by what was before, for their hysteresis."""
+        point, every = self.equilibrium, float(self.space.size)
+        fewest, most = (self.map.counted(point, before) for before in (0.0, every))
+        return point[self.map.counts], fewest, most
+
     def change(self, parameters: Sequence[tuple[str, Scalar, float]]) -> None:
         """Sets tunable parameters, by FMU, and moves to the equilibrium with them. Raises
         InputFault or FmuFault where there is none nearby."""

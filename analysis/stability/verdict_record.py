@@ -10,7 +10,7 @@ from typing import Any
 
 from hapticlink.analysis.search.search import DOUBLINGS
 from hapticlink.analysis.stability import frozen_nonlinearities
-from hapticlink.analysis.stability.hand_cases import Case, worst_case
+from hapticlink.analysis.stability.hand_cases import NOWHERE, Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
@@ -155,9 +155,11 @@ class Stability:
     def lines(self) -> Iterator[str]:
         """The result as text, below the finding."""
         yield from self._warnings()
-        yield f"{'hand':28s} {'worst pose':24s} {'growth 1/s':>11s} {'Hz':>7s}  what"
-        for hand, pose, growth, hertz, what in self._in_hands():
-            yield f"{hand:28s} {pose:24s} {growth:11.3g} {hertz:7.3g}  {what}"
+        rows = [*self._in_hands()]
+        wide = max(24, *(len(pose) for _, pose, *_ in rows))
+        yield f"{'hand':28s} {'worst pose':{wide}s} {'growth 1/s':>11s} {'Hz':>7s}  what"
+        for hand, pose, growth, hertz, what in rows:
+            yield f"{hand:28s} {pose:{wide}s} {growth:11.3g} {hertz:7.3g}  {what}"
         yield from self._below()
 
     def _warnings(self) -> Iterator[str]:
@@ -171,14 +173,19 @@ class Stability:
         """The worst case of each hand."""
         for hand in _hands(self.cases):
             worst = worst_case(c for c in self.cases if c.hand == hand.hand)
-            what = worst.kind if worst.verdict == "unstable" else worst.verdict
+            grows = worst.verdict == "unstable" or worst.kind == NOWHERE
+            what = worst.kind if grows else worst.verdict
             yield worst.hand, worst.pose, worst.growth, worst.hertz, what
 
     def _below(self) -> Iterator[str]:
         """What stands below the table of hands: margins, remedies, and what was left out."""
         poses = {case.pose for case in self.cases}
-        alone = "; other poses may have less" if len(poses) > 1 else ""
-        yield f"margin at {self.worst.pose} (drifts aside{alone}): {', '.join(self._margins())}"
+        aside = "drifts aside"
+        if any(c.pose == self.worst.pose and c.kind == NOWHERE for c in self.cases):
+            aside += f", and hands with a {NOWHERE}"
+        if len(poses) > 1:
+            aside += "; other poses may have less"
+        yield f"margin at {self.worst.pose} ({aside}): {', '.join(self._margins())}"
         full = dict.fromkeys(case.pose for case in self.cases if case.saturated)
         if full:
             yield (
@@ -224,6 +231,11 @@ class Stability:
             if case.at and case.at.found:
                 F = ", ".join(f"{round(x, 9) + 0.0:.3g}" for x in case.at.press)
                 yield f"{name}: {case.at.found}; each hand stands still there with ({F}) N and N.m"
+        if counted := [name for name, case in held.items() if case.at and case.at.counted]:
+            yield (
+                f"{', '.join(counted)}: how many directions are constrained in that pose depends "
+                "on what was before (`hysteresis`)"
+            )
         if beside := [name for name, case in held.items() if case.neutral]:
             yield (
                 f"at {', '.join(beside)} equilibria lie side by side, as in some direction nothing "

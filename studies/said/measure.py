@@ -38,6 +38,8 @@ FAR = 1e-5
 """Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift. With
 other gains, whose rest is not told, a run begins beside it: the difference of two does not."""
 OWN = "free", "the scene's own damper"
+NOWHERE = "divergence within 5 mm"
+"""A hand that margins leave out."""
 LEFT_OUT = "interpolation", "timing"
 Row = dict[str, Any]
 Ended = tuple[Growth, Any]
@@ -76,6 +78,7 @@ class Checked:
             ]
             F = np.zeros(3)
         options = {k: v for k, v in self.options.items() if k.partition(".")[0] != "hand"}
+        options |= self.counting(pose)
         if "friction of hold passive" in str(self.record["frozen"]):
             # What is told is without it, as is said, and so as by zoh. At 800/15 Hz seed 4800512
             # grows at .141 1/s by zoh; with friction 1e-9 m come to rest within 25 s.
@@ -93,6 +96,17 @@ class Checked:
             "record": {"signals": [*SCALES], "format": "rows"},
             "stop_when": "",
         }
+
+    def counting(self, pose: str) -> Row:
+        """The options with which directions are counted as told, where that depends on what was
+        before: with a tolerance of .1 as few as there can be, of .15 as many."""
+        told = self.record["equilibria"]
+        if told[pose]["counting"]:
+            return dict(told[pose]["counting"])
+        for beside, tolerance in (("fewer constrained", 0.15), ("more constrained", 0.1)):
+            if f"{pose}, {beside}" in told:
+                return {"directions.rank_tolerance": tolerance, "directions.hysteresis": 1.0}
+        return {}
 
     def step(self, told: float, changes: Row) -> float:
         """Between the snapshots of a run (s)."""
@@ -264,7 +278,7 @@ def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
     """Whether in the pose and hand of a case more than a drift, and than twice what is marginal
     there, grows; None where that is not clean."""
     hand, slow = scene.record["hands"][case["hand"]], case["growth_rate"]
-    for again, about in ((0, 1.0), (2, 0.1)):
+    for again, about in ((0, 1.0), (0, 0.1), (2, 0.1)):
         run, ended = scene.run(case["pose"], hand, about, changes, again)
         if ended is None:
             return None
@@ -275,10 +289,11 @@ def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
             if again:
                 return True
             continue
-        if not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2):
+        early, *_, middle, _, _, late = (float(p.max()) for p in np.array_split(size, 8))
+        fits = not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2)
+        if fits and (run.rate < SLIGHT or late > middle):  # else a few steps looked like that
             least = 2.2 * slow if case["verdict"] == "marginal" else 0.0
             return run.rate > max(SLIGHT, least) and not _drifts(run.rate, hertz(ended, run.step))
-        early, late = (float(part.max()) for part in np.array_split(size, 8)[::7])
         if late > 100 * early:
             return True
         if late < early / 100:
@@ -296,7 +311,8 @@ def _begins_beside(scene: Checked, case: Row, changes: Row) -> bool:
 def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str]:
     """Whether something grows in the worst pose in some of at most so many hands with changes."""
     pose, clean = scene.record["worst"]["pose"], True
-    cases = [c for c in scene.record["cases"] if c["pose"] == pose and c["hand"] not in OWN]
+    left_out = [c for c in scene.record["cases"] if c["hand"] in OWN or c["kind"] == NOWHERE]
+    cases = [c for c in scene.record["cases"] if c["pose"] == pose and c not in left_out]
     for case in sorted(cases, key=lambda c: -c["growth_rate"])[:most]:
         if grows := _grows(scene, case, changes):
             if most < len(cases) and _begins_beside(scene, case, changes):

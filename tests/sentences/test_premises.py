@@ -14,7 +14,7 @@ import hapticlink as hl
 from hapticlink.analysis.findings.report_premises import describe_experiment
 from hapticlink.analysis.findings.summary import _lacking, _percent, describe_work
 from hapticlink.analysis.stability.frozen_nonlinearities import describe_switches
-from hapticlink.analysis.stability.hand_cases import Case
+from hapticlink.analysis.stability.hand_cases import NOWHERE, Case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
@@ -100,6 +100,14 @@ def test_a_margin_says_that_other_poses_may_have_less() -> None:
     several = verdict(*one, ("1 s", "firm grip", -2.0, "stable", "oscillation"))
     (line,) = (line for line in several.lines() if line.startswith("margin"))
     assert line.startswith("margin at 0 s (drifts aside; other poses may have less): ")
+
+
+def test_a_margin_names_hands_that_it_leaves_out() -> None:
+    """Those whose divergence leads nowhere, which the table does not call marginal alone."""
+    near = ("0 s", "arm at rest, soft grip", 2.0, "marginal", NOWHERE)
+    lines = [*verdict(("0 s", "firm grip", 0.3, "unstable", "oscillation"), near).lines()]
+    assert "margin at 0 s (drifts aside, and hands with a divergence within 5 mm): " in str(lines)
+    assert any(x.startswith("arm at rest") and x.endswith(f"  {NOWHERE}") for x in lines)
 
 
 SPRING: dict[str, Any] = {

@@ -518,7 +518,7 @@ def test_a_verdict_that_is_interrupted_says_what_was_done(
 
 def test_a_verdict_tells_what_is_judged_and_counts_its_steps(beyond: Judged) -> None:
     found, told, work = beyond
-    assert counted(work) == (7, 27, 57)
+    assert counted(work) == (7, 27, 67)
     done = [k for _, k, _ in told]
     assert done == sorted(done)
     assert set(done) == set(range(done[-1] + 1))
