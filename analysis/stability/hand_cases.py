@@ -47,8 +47,11 @@ NOWHERE = "divergence within 5 mm"
 """What a hand is marginal by whose divergence leads nowhere (`Pose.leaves`), and which margins
 leave out."""
 TWICE = 2.0
+UNSURE = 0.1
+"""Uncertainty (1/s) of a growth rate, next to a singular pose, from which on rounding would decide
+a limit of stability that is found by it."""
 SURELY = 2.0
-"""Uncertainties by which a mode is past what is slight or slow, before a limit is found by it."""
+"""Uncertainties by which such a rate is past what is slight or slow, where it is a limit."""
 TIE = 1e-6
 """Difference of growth rates, relative to the larger and SLIGHT at least, up to which they are the
 same: which of them rounding makes the larger decides nothing."""
@@ -182,7 +185,8 @@ class InHands:
                 largest = max(largest, min(growth, -SLIGHT))
             elif kind(growth, period.traced(mode).omega / (2 * np.pi), bounds) != "drift":
                 apart = np.expm1(least * self._seconds) + SURELY * mode.uncertainty
-                if verdict(abs(mode.z), apart) == "unstable":
+                sure = mode.uncertainty < UNSURE * self._seconds
+                if sure or verdict(abs(mode.z), apart) == "unstable":
                     return growth
                 unsure = max(unsure, growth)
         if unsure:

@@ -18,7 +18,7 @@ from hapticlink.analysis.search.search import (
     largest_scale,
 )
 from hapticlink.analysis.search.settings import LAWS, REMEDIES, set_rate
-from hapticlink.analysis.stability.hand_cases import TIE, Case, InHands, first_of_largest
+from hapticlink.analysis.stability.hand_cases import TIE, UNSURE, Case, InHands, first_of_largest
 from hapticlink.analysis.stability.hands import FREE, OWN_FREE, UNHELD
 from hapticlink.analysis.stability.mechanism_alone import growth_alone
 from hapticlink.analysis.stability.modes import Bounds
@@ -53,9 +53,6 @@ DAMPINGS = (0.5, 2.0)
 FASTER = (2, 4)
 """Factors on rates that are tried."""
 MARGINS = "stiffness", "delay", "rate"
-UNSURE = 0.1
-"""Uncertainty (1/s) of the growth rate of a marginal case, next to a singular pose, from which on
-no limit of stability is searched: rounding would decide it."""
 TRIED = 3
 """Remedies that are judged in all poses."""
 

@@ -37,9 +37,13 @@ the words of `stability`."""
 FAR = 1e-5
 """Changes in a tick (m, rad) that a motion of 1e-9 does not reach in 20 s by a drift. With
 other gains, whose rest is not told, a run begins beside it: the difference of two does not."""
+BESIDE = 1e-7
+"""Changes of the mechanism in the first ticks (m, rad), a hundred nudges, from which on a run
+begins beside its rest."""
 OWN = "free", "the scene's own damper"
 NOWHERE = "divergence within 5 mm"
 """A hand that margins leave out."""
+BLOCKS = "haptic_device", "hand", "virtual_mechanism"
 LEFT_OUT = "interpolation", "timing"
 Row = dict[str, Any]
 Ended = tuple[Growth, Any]
@@ -256,7 +260,7 @@ def _rate(scene: Checked, case: Mapping[str, Any]) -> Claim:
         run, seen = scene.run(case["pose"], hand, told, {}, again)
         says, why = compare(case, run)
         if says != "agree" and seen is not None:
-            others = [growth_of(seen, step, told, block) for block in ("haptic_device", "hand")]
+            others = [growth_of(seen, step, told, block) for block in BLOCKS]
             if frame != step and abs(told) * frame < 1.0:
                 others.append(growth_of(seen, frame, told))
             if told * step > 1.0:
@@ -275,38 +279,43 @@ def _drifts(rate: float, frequency: float) -> bool:
     return rate < 0.2 and frequency < 1.0
 
 
-def _grows(scene: Checked, case: Row, changes: Row) -> bool | None:
+def _grows(scene: Checked, case: Row, changes: Row) -> tuple[bool | None, bool]:
     """Whether in the pose and hand of a case more than a drift, and than twice what is marginal
-    there, grows; None where that is not clean."""
-    hand, slow = scene.record["hands"][case["hand"]], case["growth_rate"]
+    there, grows; None where that is not clean. And whether with changes the told equilibrium is
+    none, so that what moves there is not small, and only the odd part of two runs counts. In seed
+    5600047, with 138 times its stiffness, the handle rises by 93 1/s to 9e-6 rad, where its motors
+    are at their limit, and comes back: what counts is how it rises."""
+    hand, slow, beside = scene.record["hands"][case["hand"]], case["growth_rate"], False
     for again, about in ((0, 1.0), (0, 0.1), (2, 0.1)):
+        if beside and not again:
+            continue
         run, ended = scene.run(case["pose"], hand, about, changes, again)
         if ended is None:
-            return None
+            return None, beside
         if ended.fault:
-            return True
+            return True, beside
+        if not again:
+            beside = bool(np.abs(np.diff(ended["virtual_mechanism.q"][:20], axis=0)).max() > BESIDE)
         size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
-        if size.max() > FAR:
-            if again:
-                return True
+        if (again or not beside) and not (rise := growth_by_ticks(ended)).why:
+            return not _drifts(rise.rate, hertz(ended, scene.step(about, changes))), beside
+        if size.max() > FAR and again:
+            return True, beside
+        if size.max() > FAR or (beside and not again):
             continue
         early, *_, middle, _, _, late = (float(p.max()) for p in np.array_split(size, 8))
         fits = not run.why and run.spread < max(0.1 * abs(run.rate), SLIGHT / 2)
         if fits and (run.rate < SLIGHT or late > middle):  # else a few steps looked like that
             least = 2.2 * slow if case["verdict"] == "marginal" else 0.0
-            return run.rate > max(SLIGHT, least) and not _drifts(run.rate, hertz(ended, run.step))
+            fast = run.rate > max(SLIGHT, least) and not _drifts(
+                run.rate, hertz(ended, scene.step(about, changes))
+            )
+            return fast, beside
         if late > 100 * early:
-            return True
+            return True, beside
         if late < early / 100:
-            return False
-    return None
-
-
-def _begins_beside(scene: Checked, case: Row, changes: Row) -> bool:
-    """Whether with changes the told equilibrium is none, so that what moves there is not small."""
-    hand = scene.record["hands"][case["hand"]]
-    _, ended = scene.run(case["pose"], hand, 1.0, changes, 0)
-    return bool(np.abs(np.diff(ended["virtual_mechanism.q"][:20], axis=0)).max() > FAR)
+            return False, beside
+    return None, beside
 
 
 def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str]:
@@ -315,8 +324,9 @@ def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str
     left_out = [c for c in scene.record["cases"] if c["hand"] in OWN or c["kind"] == NOWHERE]
     cases = [c for c in scene.record["cases"] if c["pose"] == pose and c not in left_out]
     for case in sorted(cases, key=lambda c: -c["growth_rate"])[:most]:
-        if grows := _grows(scene, case, changes):
-            if most < len(cases) and _begins_beside(scene, case, changes):
+        grows, beside = _grows(scene, case, changes)
+        if grows:
+            if most < len(cases) and beside:
                 return None, f"{case['hand']} grows, but begins beside its rest"
             return True, f"{case['hand']} grows"
         clean = clean and grows is False

@@ -30,7 +30,9 @@ class OfGrowth(InHands):
     ("changed", "own", "is_"),
     [
         ((0.06, 1e-3), (-0.06, 1e-3), "unstable"),
-        ((0.06, 0.04), (-0.06, 1e-3), "unsure"),  # by less than two uncertainties
+        ((0.06, 0.04), (-0.06, 1e-3), "unstable"),  # within two small uncertainties
+        ((0.3, 0.2), (-0.06, 1e-3), "unsure"),  # within two large ones
+        ((0.5, 0.2), (-0.06, 1e-3), "unstable"),
         ((0.06, 0.5), (-0.06, 1e-3), "unsure"),  # as likely as not, and it was stable
         ((0.06, 0.5), (-0.04, 0.5), "unsure"),  # it was marginal, and decayed
         ((0.06, 0.5), (0.05, 0.5), "stable"),  # it was marginal, and grew as fast
