@@ -175,20 +175,21 @@ def has_its_first_minute(page: Page) -> None:
 
 PLACES = """["#slow", "#remedy", "#why", "#more", "#scene"].map((name) => {
   const { x, y, width } = document.querySelector(name).getBoundingClientRect();
-  return [name, x, y + document.querySelector("main").scrollTop, width];
+  return [name, x, y, width];
 })"""
-"""Of what is pressed in the first minute, wherever the page is scrolled to."""
+"""Of what is pressed in the first minute."""
 SLOWLY = """() => {
-  if (!view.state.ended || !document.getElementById("note").textContent.startsWith("slow")) return false;
-  const scene = view.stage.canvas.getBoundingClientRect(), over = document.getElementById("over").getBoundingClientRect();
-  const [x, y] = view.stage.toScreen(view.stage.frame.handle);
-  const force = (of, name) => [...document.querySelectorAll(of)].find((each) => each.textContent.includes(name)).querySelector("b").textContent;
-  view.slowly ??= [];
-  view.slowly.push({
+  const of = (query) => document.querySelector(query), { frame, canvas } = view.stage;
+  if (!view.state.ended || !of("#note").textContent.startsWith("slow")) return false;
+  const over = of("#over").getBoundingClientRect(), scene = canvas.getBoundingClientRect();
+  const [x, y] = view.stage.toScreen(frame.handle), [right, down] = [scene.x + x, scene.y + y];
+  const items = [...document.querySelectorAll("#legend li")];
+  const legend = items.find((item) => item.textContent.includes("force, hand"));
+  view.slowly = [...(view.slowly ?? []), {
     inside: x >= 0 && y >= 0 && x <= scene.width && y <= scene.height,
-    covered: scene.y + y > over.y && scene.y + y < over.bottom && scene.x + x < over.right,
-    legend: force("#legend li", "force, hand"), caption: document.querySelector("[data-chart=force] b").textContent,
-  });
+    covered: down > over.y && down < over.bottom && right < over.right,
+    forces: [legend, of("[data-chart=force]")].map((each) => each.querySelector("b").textContent),
+  }];
   return view.slowly.length >= 30;
 }"""
 """Collects in slow motion what the picture and the plots show."""
@@ -211,9 +212,7 @@ def goes_on_when_mended(page: Page) -> None:
     page.page.wait_for_function(SLOWLY, timeout=60_000)
     seen = page.get("view.slowly")
     assert all(each["inside"] and not each["covered"] for each in seen)
-    assert [each["caption"].split(" ", 1)[1] for each in seen] == [
-        each["legend"] for each in seen
-    ]
+    assert all(caption == f"hand {legend}" for legend, caption in (e["forces"] for e in seen))
     page.until(f"{ended}.startsWith('The run before diverged at ')")
     assert page.get(PLACES) == places
     page.page.mouse.up()
@@ -222,6 +221,7 @@ def goes_on_when_mended(page: Page) -> None:
     assert page.get(ended).startswith("The run before diverged at ")
     assert not page.get(ended).endswith("(see More).")  # but with its message
     page.page.click("#more summary")
+    page.get("document.querySelector('main').scrollTo(0, 0)")
     page.pull(0.02, -0.015)
     page.until(f"{ended}.startsWith('Diverged at ')")
     page.page.mouse.up()

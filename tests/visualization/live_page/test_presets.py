@@ -81,7 +81,7 @@ SHOWN = """
 def test_what_a_run_ended_with_goes_at_a_press_or_is_said_of_the_run_before(
     press: bool, run: str | None
 ) -> None:
-    """Once another one runs, until a third one does: while the last moments are shown it is read."""
+    """Until a third one runs; while the last moments are shown it is read."""
     acts = "ending.hide();" if press else ""
     meanwhile, then, later, frame = javascript(
         "ending.js", f"{SHOWN}{acts}const meanwhile = said(); }});", run
@@ -126,7 +126,7 @@ def test_a_run_that_diverges_is_said_shown_again_slowly_and_begins_anew(
     page.until("!view.state.ended && view.frame?.t > 0.1")  # pulled on by what is still pressed
     page.page.mouse.move(400, 400, steps=2)
     page.until("Math.hypot(...view.frame.F_hand.slice(0, 2)) > 0.5")
-    assert "diverged at " in page.page.inner_text("#ended").lower()  # of the run before, or the next one
+    assert "diverged at " in page.page.inner_text("#ended").lower()
     page.page.mouse.up()
     page.page.click("#restore")
     page.until(
