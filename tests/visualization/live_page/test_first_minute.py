@@ -323,3 +323,20 @@ def test_why_has_the_rate_of_the_force_not_the_highest_of_the_linkage() -> None:
     rate = {"value": 40, "max": 50, "haptics": 512}
     said = javascript("first_minute.js", "answer = why(given, true);", rate)
     assert "computed 40 times a second, the force on the hand 512 times" in said
+
+
+def test_a_handle_that_leaves_the_picture_is_taken_in() -> None:
+    """With a margin of .15 of its size, and not by more than that on either side."""
+    found = javascript(
+        "stage.js",
+        """const stage = { limits: [[0, 1], [0, 0.5]], view: { project: (at) => at } };
+        const widened = (...at) => {
+          Stage.prototype.include.call(stage, at.map((handle) => ({ handle })));
+          return stage.limits;
+        };
+        answer = [widened([0.5, 0.25]), widened([0.5, 0.7], null), widened([-9, 0.25])];""",
+        None,
+    )
+    assert found[0] == [[0, 1], [0, 0.5]]
+    assert np.ravel(found[1]) == pytest.approx([0, 1, 0, 0.85])
+    assert np.ravel(found[2]) == pytest.approx([-1, 1, 0, 0.85])
