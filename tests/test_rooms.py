@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2995,
     "orchestrator": 16914,
     "programs": 1047,
-    "analysis": 9193,
+    "analysis": 9199,
     "visualization": 3848,
     "api": 637,
     "commands": 1638,

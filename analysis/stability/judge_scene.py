@@ -234,8 +234,10 @@ def _judge(
             cases[cases.index(worst)] = replace(worst, verdict="marginal", kind=NOWHERE)
             worst = worst_case(cases)
         there = [case for case in cases if case.pose == worst.pose]
-        near = {c.hand for c in there if c.kind == NOWHERE}
-        held = {name: hand for name, hand in hands.items() if name not in near} or hands
+        near = tuple(case.hand for case in there if case.kind == NOWHERE)
+        if len(near) == sum(not case.free for case in there):
+            near = ()  # else no hand would be left to be searched with
+        held = {name: hand for name, hand in hands.items() if name not in near}
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         hardest = hardest_first(cases)
         margin, remedies = improvements(
@@ -251,7 +253,7 @@ def _judge(
         cases=tuple(cases),
         without=without,
         worst=worst,
-        margin=margin,
+        margin=replace(margin, left_out=near),
         remedies=remedies,
         frozen=frozen,
         rounded=rounded,

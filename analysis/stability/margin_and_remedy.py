@@ -76,6 +76,8 @@ class Margin:
     alone: float = 0.0
     """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
     where it is no more than a drift."""
+    left_out: tuple[str, ...] = ()
+    """The hands that were not searched with, as their divergence there leads nowhere."""
     unsure: float = 0.0
     """The uncertainty (1/s) of growth rates there, where it is why nothing was searched."""
 

@@ -181,7 +181,7 @@ class Stability:
         """What stands below the table of hands: margins, remedies, and what was left out."""
         poses = {case.pose for case in self.cases}
         aside = "drifts aside"
-        if any(c.pose == self.worst.pose and c.kind == NOWHERE for c in self.cases):
+        if self.margin.left_out:
             aside += f", and hands with a {NOWHERE}"
         if len(poses) > 1:
             aside += "; other poses may have less"
@@ -205,6 +205,8 @@ class Stability:
                 how = "nothing grows by more than a drift"
             elif not remedy.stable and remedy.growth >= 0.0:
                 how = f"improves most, to {remedy.growth:.2g} 1/s, which is not enough"
+            if self.margin.left_out:
+                how += " in the other hands"
             if remedy.marginal:
                 how += f"; marginal in {len(remedy.marginal)} of the hands"
             if remedy.breaks:

@@ -41,8 +41,6 @@ BESIDE = 1e-7
 """Changes of the mechanism in the first ticks (m, rad), a hundred nudges, from which on a run
 begins beside its rest."""
 OWN = "free", "the scene's own damper"
-NOWHERE = "divergence within 5 mm"
-"""A hand that margins leave out."""
 BLOCKS = "haptic_device", "hand", "virtual_mechanism"
 LEFT_OUT = "interpolation", "timing"
 Row = dict[str, Any]
@@ -321,8 +319,9 @@ def _grows(scene: Checked, case: Row, changes: Row) -> tuple[bool | None, bool]:
 def _in_hands(scene: Checked, changes: Row, most: int) -> tuple[bool | None, str]:
     """Whether something grows in the worst pose in some of at most so many hands with changes."""
     pose, clean = scene.record["worst"]["pose"], True
-    left_out = [c for c in scene.record["cases"] if c["hand"] in OWN or c["kind"] == NOWHERE]
-    cases = [c for c in scene.record["cases"] if c["pose"] == pose and c not in left_out]
+    left_out = (*OWN, *scene.record["margin"]["left_out"])
+    there = [c for c in scene.record["cases"] if c["pose"] == pose]
+    cases = [c for c in there if c["hand"] not in left_out]
     for case in sorted(cases, key=lambda c: -c["growth_rate"])[:most]:
         grows, beside = _grows(scene, case, changes)
         if grows:
