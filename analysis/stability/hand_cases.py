@@ -247,7 +247,8 @@ def in_poses(
     work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
     """The cases in all poses, each of which `begin` is told, and by pose why it has none. A pose in
-    which the number of constrained directions depends on what was before is judged with each."""
+    which the number of constrained directions depends on what was before is judged with the fewest
+    and the most."""
     cases: list[Case] = []
     without: dict[str, str] = {}
     for pose in (left := [*poses]):

@@ -14,7 +14,7 @@ from hapticlink.analysis.stability.hand_cases import NOWHERE, Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
-from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.poses import NEAR, Pose
 from hapticlink.analysis.stability.remedy_trial import Remedy
 from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
@@ -209,6 +209,8 @@ class Stability:
                 how += " in the other hands"
             if remedy.marginal:
                 how += f"; marginal in {len(remedy.marginal)} of the hands"
+            if remedy.drifting:
+                how += f"; drifts in {len(remedy.drifting)} of the hands"
             if remedy.breaks:
                 how += f"; but in its run {remedy.breaks}"
             yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
@@ -233,6 +235,14 @@ class Stability:
             if case.at and case.at.found:
                 F = ", ".join(f"{round(x, 9) + 0.0:.3g}" for x in case.at.press)
                 yield f"{name}: {case.at.found}; each hand stands still there with ({F}) N and N.m"
+        visited = {pose.name: pose for pose in self.poses if not pose.found}
+        off = {n: c.at.apart(visited[n]) for n, c in held.items() if c.at and n in visited}
+        if far := [name for name, length in off.items() if length > NEAR]:
+            most = max(off.values())
+            yield (
+                f"at {', '.join(far)} the equilibrium that is judged is up to {1e3 * most:.2g} mm "
+                "from where the run was"
+            )
         if counted := [name for name, case in held.items() if case.at and case.at.counted]:
             yield (
                 f"{', '.join(counted)}: how many directions are constrained in that pose depends "
