@@ -237,8 +237,6 @@ def _judge(
         worst = worst_case(cases)
         there = [case for case in cases if case.pose == worst.pose]
         near = tuple(case.hand for case in there if case.kind == NOWHERE)
-        if len(near) == sum(not case.free for case in there):
-            near = ()  # else no hand would be left to be searched with
         held = {name: hand for name, hand in hands.items() if name not in near}
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         hardest = hardest_first(cases)

@@ -262,8 +262,8 @@ class Stability:
                 return f"{what}at least {value} (not searched further)"
             return f"{what}{value}"
 
-        if margin.unsure:
-            yield f"not searched, as growth rates there are uncertain by {margin.unsure:.2g} 1/s"
+        if margin.not_searched:
+            yield f"not searched, {margin.not_searched}"
             return
         if margin.stiffness is not None:
             some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")
