@@ -293,10 +293,10 @@ def _grows(scene: Checked, case: Row, changes: Row) -> tuple[bool | None, bool]:
         run, ended = scene.run(case["pose"], hand, about, changes, again)
         if ended is None:
             return None, beside
-        if ended.fault:
-            return True, beside
         if not again:
             beside = bool(np.abs(np.diff(ended["virtual_mechanism.q"][:20], axis=0)).max() > BESIDE)
+        if ended.fault:
+            return True, beside
         size = np.abs(np.diff(ended["haptic_device.x_true"], axis=0)).max(axis=1)
         if (again or not beside) and not (rise := growth_by_ticks(ended)).why:
             return not _drifts(rise.rate, hertz(ended, scene.step(about, changes))), beside
