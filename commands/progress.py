@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 
 from hapticlink.fmus.durations import record_duration
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
@@ -80,18 +80,20 @@ def time_command(
 @contextmanager
 def waiting(what: str, hidden: bool = False) -> Iterator[None]:
     """Says what is being done, for as long as it takes, and how long it took before, where nothing
-    can be counted; once at the start where stderr is no terminal."""
-    with record_duration(what) as took:
-        if hidden or not sys.stderr.isatty():
-            if not hidden:
-                _tell(what, took)
-            yield
-            return
-        from rich.console import Console
-        from rich.markup import escape
+    can be counted; once at the start where stderr is no terminal. Raises Interrupted with it."""
+    with record_duration(what) as took, ExitStack() as stack:
+        if not hidden and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.markup import escape
 
-        with Console(stderr=True).status(escape(printable(_say_duration(what, took)))):
+            said = escape(printable(_say_duration(what, took)))
+            stack.enter_context(Console(stderr=True).status(said))
+        elif not hidden:
+            _tell(what, took)
+        try:
             yield
+        except Interrupted:
+            raise Interrupted(when=f"({what})") from None
 
 
 def _say_duration(what: str, took: float | None) -> str:

@@ -34,10 +34,10 @@ CODE_LINES = {
     "fmus": 2995,
     "orchestrator": 16914,
     "programs": 1047,
-    "analysis": 9193,
+    "analysis": 9215,
     "visualization": 3852,
     "api": 637,
-    "commands": 1638,
+    "commands": 1640,
 }
 """The most lines of Python that a building may have, without blank lines, comments, docstrings and
 imports. A number is raised only in a commit that says why."""

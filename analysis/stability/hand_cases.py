@@ -24,7 +24,7 @@ from hapticlink.analysis.stability.modes import (
     modes,
     verdict,
 )
-from hapticlink.analysis.stability.poses import Pose, at_pose
+from hapticlink.analysis.stability.poses import NEAR, Pose, at_pose
 from hapticlink.analysis.stability.resting_scene import RestingScene
 from hapticlink.analysis.stability.shared_work import SharedWork
 from hapticlink.components.device.motors_and_encoders import motor_torques, torque_shares
@@ -43,9 +43,8 @@ from hapticlink.orchestrator.scene.scene import Scene
 SHARES = 3
 SLIGHT = 0.01
 """Growth rate (1/s) of a marginal case, which takes more than a minute to double."""
-NOWHERE = "divergence within 5 mm"
-"""What a hand is marginal by whose divergence leads nowhere (`Pose.leaves`), and which margins
-leave out."""
+NOWHERE = f"divergence within {1e3 * NEAR:g} mm"
+"""What a hand is marginal by whose divergence leads nowhere (`Pose.leaves`)."""
 TWICE = 2.0
 UNSURE = 0.1
 """Uncertainty (1/s) of a growth rate, next to a singular pose, from which on rounding would decide
@@ -248,7 +247,8 @@ def in_poses(
     work: SharedWork | None = None,
 ) -> tuple[list[Case], dict[str, str]]:
     """The cases in all poses, each of which `begin` is told, and by pose why it has none. A pose in
-    which the number of constrained directions depends on what was before is judged with each."""
+    which the number of constrained directions depends on what was before is judged with the fewest
+    and the most."""
     cases: list[Case] = []
     without: dict[str, str] = {}
     for pose in (left := [*poses]):

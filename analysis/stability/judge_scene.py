@@ -220,26 +220,28 @@ def _judge(
     named = {pose.name: pose for pose in visited}
     steps.expected += len(visited) + len(MARGINS)
     with interrupt.defer_signals(), np.errstate(invalid="ignore", over="ignore"):
-        cases, without = in_poses(
-            short_read, visited, hands, bounds, lambda pose: steps.begin(f"pose at {pose}"), work
-        )
+
+        def begin(pose: str) -> None:
+            steps.expected += pose not in named
+            steps.begin(f"pose at {pose}")
+
+        cases, without = in_poses(short_read, visited, hands, bounds, begin, work)
         if not cases:
             name, why = next(iter(without.items()))
             raise InputFault(f"no equilibrium is found in any pose, at {name}: {why}")
         named |= {case.pose: case.at for case in cases if case.at and case.at.counted}
+        for i, case in enumerate(cases):
+            diverges = case.kind == "divergence" and case.verdict == "unstable" and not case.free
+            if diverges and not named[case.pose].leaves(short_read, hands[case.hand]):
+                cases[i] = replace(case, verdict="marginal", kind=NOWHERE)
         worst = worst_case(cases)
-        while worst.kind == "divergence" and worst.verdict == "unstable" and not worst.free:
-            if named[worst.pose].leaves(short_read, hands[worst.hand]):
-                break
-            cases[cases.index(worst)] = replace(worst, verdict="marginal", kind=NOWHERE)
-            worst = worst_case(cases)
         there = [case for case in cases if case.pose == worst.pose]
-        near = {c.hand for c in there if c.kind == NOWHERE}
-        held = {name: hand for name, hand in hands.items() if name not in near} or hands
+        near = tuple(case.hand for case in there if case.kind == NOWHERE)
+        held = {name: hand for name, hand in hands.items() if name not in near}
         steps.found = f"{worst.verdict}, at {worst.growth:.3g} 1/s in {worst.hand}"
         hardest = hardest_first(cases)
         margin, remedies = improvements(
-            read, named[worst.pose], held, bounds, worst, visits, hardest, work, steps
+            read, worst.at or named[worst.pose], held, bounds, worst, visits, hardest, work, steps
         )
         with linearisable(short_read) as (_, system, removed):
             frozen = (*removed, *frozen_nonlinearities.describe_switches(system))
@@ -251,7 +253,7 @@ def _judge(
         cases=tuple(cases),
         without=without,
         worst=worst,
-        margin=margin,
+        margin=replace(margin, left_out=near),
         remedies=remedies,
         frozen=frozen,
         rounded=rounded,

@@ -76,8 +76,10 @@ class Margin:
     alone: float = 0.0
     """The growth rate (1/s) of the mechanism in that pose by itself, without hand and rendering; 0
     where it is no more than a drift."""
-    unsure: float = 0.0
-    """The uncertainty (1/s) of growth rates there, where it is why nothing was searched."""
+    left_out: tuple[str, ...] = ()
+    """The hands that were not searched with, as their divergence there leads nowhere."""
+    not_searched: str = ""
+    """Why nothing was searched."""
 
 
 def improvements(
@@ -95,9 +97,12 @@ def improvements(
     `remedies`; nothing where it is stable. visited: gives the poses in which the scene with other
     options is judged, those that are named in `hardest` first."""
     if worst.verdict == "marginal" and worst.uncertainty > UNSURE:
-        return Margin(None, None, None, unsure=worst.uncertainty), ()
+        unsure = f"as growth rates there are uncertain by {worst.uncertainty:.2g} 1/s"
+        return Margin(None, None, None, not_searched=unsure), ()
     first = sorted(hands, key=lambda name: name != worst.hand)
     held = {name: hands[name] for name in first if name not in (FREE, OWN_FREE)}
+    if not held:
+        return Margin(None, None, None, not_searched="as no hand is left"), ()
     search = _Search(read, pose, held, bounds, work or SharedWork(), steps or Steps(None, 0))
     stable = worst.free or worst.verdict != "unstable" or worst.drifts
     with search.place() as (place, _):

@@ -41,7 +41,9 @@ from hapticlink.orchestrator.base.arrays import Complex, Matrix, Vector
 from hapticlink.orchestrator.base.errors import InputFault
 
 ONE = 1e-7
-"""Largest deviation from 1 of the diagonal entry of a parameter."""
+"""Largest deviation from 1 of the diagonal entry of a parameter, and of eigenvalues that are 1:
+two that coincide without two directions are as far apart as the root of rounding, about 1e-8, which
+their uncertainty by the first order does not have."""
 FLOOR = 1e-9
 """Relative error of the entries of A by rounding."""
 DOUBLED = 2.0
@@ -122,7 +124,7 @@ class Mode:
     @property
     def neutral(self) -> bool:
         """Whether z is 1 within its uncertainty: a motion that neither grows nor decays."""
-        return abs(self.z - 1.0) <= min(self.uncertainty, NEAR)
+        return abs(self.z - 1.0) <= max(ONE, min(self.uncertainty, NEAR))
 
     @property
     def is_in_doubt(self) -> bool:

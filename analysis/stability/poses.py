@@ -137,6 +137,11 @@ class Pose:
                 by = {"directions.rank_tolerance": tolerance, "directions.hysteresis": 1.0}
                 yield replace(self, counted=word, counting=by)
 
+    def apart(self, other: Pose) -> float:
+        """How far (m) its point, and the handle, are from the point of another pose."""
+        places = np.array([x for x in (self.point, self.handle) if x])
+        return float(self.space.distance(places - other.point).max())
+
     def leaves(self, read: Scene, hand: Hand | None) -> bool:
         """Whether the run of a scene from this pose on, in a hand that stands still next to it,
         comes further away than NEAR; one that fails does."""

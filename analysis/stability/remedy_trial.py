@@ -31,13 +31,14 @@ breaks."""
 class Remedy:
     """Options, and the growth rate (1/s) of the worst case in all poses and hands with them, those
     aside that are marginal or only drift. stable: whether it decays by DECAY at least; marginal:
-    the hands in which small motions neither grow nor decay in some pose; breaks: the limit that the
-    run with them breaks."""
+    the hands in which small motions neither grow nor decay in some pose; drifting: those in which
+    they drift; breaks: the limit that the run with them breaks."""
 
     options: tuple[str, ...]
     growth: float
     stable: bool
     marginal: tuple[str, ...] = ()
+    drifting: tuple[str, ...] = ()
     breaks: str = ""
 
     @property
@@ -84,8 +85,9 @@ class Trial:
         if self.ended and (self._without or not self._cases):
             growth = float("inf")
         slight = {case.hand for case in self._cases if case.verdict == "marginal"}
-        marginal = tuple(hand for hand in self._hands if hand in slight)
-        return Remedy(self.options, growth, growth < -DECAY, marginal, self._breaks)
+        slow = {case.hand for case in self._cases if case.drifts}
+        marginal, drifting = (tuple(x for x in self._hands if x in some) for some in (slight, slow))
+        return Remedy(self.options, growth, growth < -DECAY, marginal, drifting, self._breaks)
 
     def judge_further(self) -> None:
         """Judges one more pose, if there is one."""

@@ -14,7 +14,7 @@ from hapticlink.analysis.stability.hand_cases import NOWHERE, Case, worst_case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
-from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.poses import NEAR, Pose
 from hapticlink.analysis.stability.remedy_trial import Remedy
 from hapticlink.analysis.stability.stand_in import StandIn, record_stand_ins
 from hapticlink.components.specs.hand import Hand
@@ -181,7 +181,7 @@ class Stability:
         """What stands below the table of hands: margins, remedies, and what was left out."""
         poses = {case.pose for case in self.cases}
         aside = "drifts aside"
-        if any(c.pose == self.worst.pose and c.kind == NOWHERE for c in self.cases):
+        if self.margin.left_out:
             aside += f", and hands with a {NOWHERE}"
         if len(poses) > 1:
             aside += "; other poses may have less"
@@ -205,8 +205,12 @@ class Stability:
                 how = "nothing grows by more than a drift"
             elif not remedy.stable and remedy.growth >= 0.0:
                 how = f"improves most, to {remedy.growth:.2g} 1/s, which is not enough"
+            if self.margin.left_out:
+                how += " in the other hands"
             if remedy.marginal:
                 how += f"; marginal in {len(remedy.marginal)} of the hands"
+            if remedy.drifting:
+                how += f"; drifts in {len(remedy.drifting)} of the hands"
             if remedy.breaks:
                 how += f"; but in its run {remedy.breaks}"
             yield f"{'remedy' if remedy is self.remedies[0] else 'or'}: {options}: {how}"
@@ -231,6 +235,14 @@ class Stability:
             if case.at and case.at.found:
                 F = ", ".join(f"{round(x, 9) + 0.0:.3g}" for x in case.at.press)
                 yield f"{name}: {case.at.found}; each hand stands still there with ({F}) N and N.m"
+        visited = {pose.name: pose for pose in self.poses if not pose.found}
+        off = {n: c.at.apart(visited[n]) for n, c in held.items() if c.at and n in visited}
+        if far := [name for name, length in off.items() if length > NEAR]:
+            most = max(off.values())
+            yield (
+                f"at {', '.join(far)} the equilibrium that is judged is up to {1e3 * most:.2g} mm "
+                "from where the run was"
+            )
         if counted := [name for name, case in held.items() if case.at and case.at.counted]:
             yield (
                 f"{', '.join(counted)}: how many directions are constrained in that pose depends "
@@ -250,8 +262,8 @@ class Stability:
                 return f"{what}at least {value} (not searched further)"
             return f"{what}{value}"
 
-        if margin.unsure:
-            yield f"not searched, as growth rates there are uncertain by {margin.unsure:.2g} 1/s"
+        if margin.not_searched:
+            yield f"not searched, {margin.not_searched}"
             return
         if margin.stiffness is not None:
             some = told("stiffness", "stiffnesses ", f"times {_within(margin.stiffness)}")

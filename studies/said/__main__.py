@@ -15,7 +15,7 @@ from studies.said.cases import drawn
 from studies.said.measure import Checked, claims
 from studies.said.page import write
 
-FIRST, COUNT = 5500200, 30
+FIRST, COUNT = 5800400, 30
 
 
 def judged(seed: int) -> dict[str, Any]:

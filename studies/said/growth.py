@@ -108,11 +108,11 @@ def hertz(run: Any, step: float) -> float:
     return (len(changes) - 1) / 2 / float(time[changes[-1]] - time[changes[0]])
 
 
-def growth_of(run: Any, step: float, told: float, block: str = "") -> Growth:
+def growth_of(run: Any, step: float, told: float, block: str = "", creeps: bool = False) -> Growth:
     """The growth rate of a run of which a rate is told, in changes over `step` (s) of what is seen
-    of a `block`, or of all."""
+    of a `block`, or of all; in changes of these if it `creeps`, or nothing is found otherwise."""
     d = _changes(run, step, block)
-    found = _fit(d, step, told)
+    found = Growth(why="a creep") if creeps else _fit(d, step, told)
     return _fit(np.diff(d, axis=0), step, told) if found.why else found
 
 

@@ -15,7 +15,7 @@ from matplotlib.image import imread
 
 import hapticlink as hl
 from hapticlink.analysis.findings import summary
-from hapticlink.commands.progress import progress, time_command
+from hapticlink.commands.progress import progress, time_command, waiting
 from hapticlink.fmus import durations
 from hapticlink.orchestrator import open_scene
 from hapticlink.orchestrator.base.errors import Fault, Interrupted
@@ -221,6 +221,11 @@ def test_an_interrupted_command_keeps_no_duration(
 ) -> None:
     monkeypatch.setenv("HAPTICLINK_CACHE", str(tmp_path))
     with pytest.raises(Fault, match="finished runs are kept"), time_command("bench it"):
+        raise Interrupted
+    with (
+        pytest.raises(Interrupted, match=r"interrupted \(the user's port\)"),
+        waiting("the user's port"),
+    ):
         raise Interrupted
     assert not [*tmp_path.iterdir()]
 

@@ -18,6 +18,8 @@ from hapticlink.analysis.stability.hand_cases import NOWHERE, Case
 from hapticlink.analysis.stability.hands import FREE
 from hapticlink.analysis.stability.margin_and_remedy import Margin
 from hapticlink.analysis.stability.modes import Bounds
+from hapticlink.analysis.stability.poses import Pose
+from hapticlink.analysis.stability.remedy_trial import Remedy
 from hapticlink.analysis.stability.smooth_scene import linearisable
 from hapticlink.analysis.stability.verdict_record import Stability
 from hapticlink.analysis.tune.tuning_result import Tuned
@@ -105,9 +107,37 @@ def test_a_margin_says_that_other_poses_may_have_less() -> None:
 def test_a_margin_names_hands_that_it_leaves_out() -> None:
     """Those whose divergence leads nowhere, which the table does not call marginal alone."""
     near = ("0 s", "arm at rest, soft grip", 2.0, "marginal", NOWHERE)
-    lines = [*verdict(("0 s", "firm grip", 0.3, "unstable", "oscillation"), near).lines()]
+    found = verdict(("0 s", "firm grip", 0.3, "unstable", "oscillation"), near)
+    remedy = Remedy(("hold=zoh",), -0.5, True)
+    margin = Margin(2.0, None, None, left_out=(near[1],))
+    lines = [*replace(found, margin=margin, remedies=(remedy,)).lines()]
     assert "margin at 0 s (drifts aside, and hands with a divergence within 5 mm): " in str(lines)
     assert any(x.startswith("arm at rest") and x.endswith(f"  {NOWHERE}") for x in lines)
+    assert any(x.endswith("decays at 0.5 1/s in the other hands") for x in lines)
+    assert "drifts aside): " in str([*found.lines()])
+
+
+def test_a_remedy_says_in_how_many_hands_it_drifts() -> None:
+    found = verdict(("0 s", "firm grip", 0.3, "unstable", "oscillation"))
+
+    def said(*drifting: str) -> str:
+        remedy = Remedy(("hold=zoh",), -0.5, True, drifting=drifting)
+        return next(x for x in replace(found, remedies=(remedy,)).lines() if "remedy" in x)
+
+    assert said().endswith("decays at 0.5 1/s")
+    assert said("light touch", "stiff arm").endswith("1/s; drifts in 2 of the hands")
+
+
+@pytest.mark.parametrize(("aside", "told"), [(0.004, False), (0.05, True)])
+def test_an_equilibrium_far_from_the_run_is_told(aside: float, told: bool) -> None:
+    """The handle counts, too, but no angle."""
+    pose = Pose(0.0, {}, (0.1, 0.0, 0.0), (0.0, 0.0, 0.0))
+    found = verdict(("0 s", "firm grip", -1.0, "stable", "oscillation"))
+    (case,) = found.cases
+    at = replace(pose, point=(0.1, 0.0, 0.5), handle=(0.1, aside, 0.0))
+    lines = replace(found, poses=(pose,), cases=(replace(case, at=at),)).lines()
+    far = "at 0 s the equilibrium that is judged is up to 50 mm from where the run was"
+    assert (far in lines) == told
 
 
 SPRING: dict[str, Any] = {

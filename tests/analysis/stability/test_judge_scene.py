@@ -285,7 +285,14 @@ def test_motors_at_their_limit_leave_the_hand_the_bare_device() -> None:
     )
     growth = np.log(np.abs(np.linalg.eigvals(step)).max()) / T
     assert case.growth == pytest.approx(growth, rel=0.01)
-    told = Mock(cases=[case], worst=case, _margins=list, remedies=(), without={})
+    told = Mock(
+        cases=[case],
+        worst=case,
+        _margins=list,
+        margin=Margin(None, None, None),
+        remedies=(),
+        without={},
+    )
     assert "at pulled motors are at their limit" in [*islice(Stability._below(told), 2)][1]
 
 
@@ -341,7 +348,9 @@ def test_a_margin_leaves_drifts_aside(slider: hl.Scene, monkeypatch: pytest.Monk
     case = Case(pose.name, "firm grip", 0.1, 0.0, 0.5, "drift", "unstable", ())
     margin, _ = improvements(slider, pose, HANDS, DRIFT, case, lambda _: ([pose], ""))
     assert margin.stiffness == pytest.approx(2.0, rel=0.02)
-    told = Mock(cases=[case], worst=case, remedies=(), without={}, _margins=lambda: ["half"])
+    told = Mock(
+        cases=[case], worst=case, remedies=(), without={}, margin=margin, _margins=lambda: ["half"]
+    )
     assert next(Stability._below(told)) == "margin at 0 s (drifts aside): half"
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hapticlink.analysis.stability.hand_cases import SLIGHT, Bounds, InHands
-from hapticlink.analysis.stability.modes import Linearisation, Mode, modes, verdict
+from hapticlink.analysis.stability.modes import Linearisation, Mode, judged_modes, modes, verdict
 from hapticlink.orchestrator.base.errors import InputFault
 
 
@@ -66,6 +66,15 @@ def test_eigenvalues_that_coincide_are_as_uncertain_as_errors_move_them(
     assert abs(first.z) == pytest.approx(0.8, abs=1e-6)
     assert first.uncertainty == pytest.approx(np.sqrt(error), rel=0.25)
     assert verdict(abs(first.z), first.uncertainty) == said
+
+
+def test_two_eigenvalues_1_without_two_directions_are_neutral() -> None:
+    """Rounding by 1e-16 takes them 1e-8 apart."""
+    A = np.array([[1.0, 1.0, 0.0], [1e-16, 1.0, 0.0], [0.0, 0.0, 0.5]])
+    found = modes(Linearisation(np.zeros(3), np.zeros(3), np.eye(3), A, 0.0 * A), 1.0)
+    assert abs(found[0].z - 1.0) > 1e-9
+    assert [mode.neutral for mode in found] == [True, True, False]
+    assert judged_modes(found) == [found[2]]
 
 
 @pytest.mark.parametrize("exponent", [100, 150, 250])
