@@ -35,7 +35,7 @@ CODE_LINES = {
     "orchestrator": 16914,
     "programs": 1047,
     "analysis": 9215,
-    "visualization": 3848,
+    "visualization": 3852,
     "api": 637,
     "commands": 1640,
 }

@@ -19,14 +19,18 @@ export function firstMinute(controls) {
   return { rate, rates, softer: scaled(controls, SOFTER), about };
 }
 
-// What is said of the handle, and in which light: of its vibration, the hand's force (none of one that holds a board), whether it
-// was watched for long enough, and whether the run has ended.
-export function felt(vibration, force, watched, ended) {
+// What is said of the handle, and in which light: of its vibration, whether a hand pulls it, whether it was watched for long
+// enough, whether the run has ended, and what it did without the remedy that is on.
+export function felt(vibration, pulled, watched, ended, did) {
   if (DIVERGED.test(ended)) return ["The motion grew beyond all bounds: see the slow motion. Then it begins anew.", "red"];
-  if (ended) return ["The run has ended: the line above the picture says why.", "red"];
-  if (vibration) return [`The handle vibrates (red trace): ${vibration.times} times to and fro in the last second, by ${vibration.mm.toPrecision(2)} mm.`, "red"];
-  if (force && !force.some(Boolean)) return ["No hand pulls: press on the picture and drag.", ""];
+  if (ended) return ["The run has ended: the line on the picture says why.", "red"];
+  if (vibration) {
+    const seen = `in the last second, by ${vibration.mm.toPrecision(2)} mm.`, { times } = vibration;
+    return [pulled ? `The handle vibrates (red trace): ${times} times to and fro ${seen}` : `No hand pulls (its damper stays): the handle vibrates, ${times} times ${seen}`, "red"];
+  }
+  if (!pulled) return ["No hand pulls: press on the picture and drag.", ""];
   if (!watched) return ["A second is watched first.", ""];
+  if (did) return [`The handle is steady: at this rate it ${did} before, and the softer coupling ended that.`, "green"];
   return ["The handle is steady: in the last second, fewer than 3 swings of 1 mm are seen.", "green"];
 }
 
@@ -41,6 +45,7 @@ export class FirstMinute {
     this.host = host;
     this.send = send;
     this.swings = new Swings();
+    this.did = new Map(); // by all other settings: what the handle did without the remedy, "" where the remedy did not end it
     const $ = (id) => host.querySelector(`#${id}`);
     [this.slider, this.ends, this.hertz, this.light, this.felt, this.remedy, this.why] = ["slow", "ends", "hertz", "felt", "said", "remedy", "why"].map($);
   }
@@ -70,22 +75,33 @@ export class FirstMinute {
     return key === rate.key ? value >= rates[0] && value <= rates.at(-1) : softer.some((each) => each.key === key && each.value === value);
   }
 
-  show(controls) {
+  // `alone`: no second run is beside it.
+  show(controls, alone) {
     if (!this.offered) return;
     const { rate, rates, softer } = this.offered, of = new Map(controls.map((control) => [control.key, control]));
     const now = of.get(rate.key), place = rates.findLastIndex((hertz) => hertz <= now.value);
     if (!this.slider.matches(":active")) this.slider.value = Math.max(place, 0);
     this.hertz.textContent = this.slider.ariaValueText = now.value ? `${+now.value.toPrecision(3)} Hz` : "varying";
     this.remedy.hidden = !softer.length || !softer.every(({ key }) => of.has(key)); // the hold model counts with these gains
-    this.remedy.ariaPressed = softer.every(({ key, value }) => of.get(key)?.value === value);
+    this.remedy.ariaPressed = this.soft = !this.remedy.hidden && softer.every(({ key, value }) => of.get(key)?.value === value);
+    this.others = alone && JSON.stringify(controls.map(({ key, value }) => (softer.some((each) => each.key === key) ? null : value)));
+    const settings = JSON.stringify([...of].map(([key, { value }]) => [key, value]));
+    if (settings !== this.settings) this.changed = this.swings.t;
+    this.settings = settings;
     this.why.textContent = why(now, controls.some(({ value }) => value === "ahead"));
   }
 
   // A frame of the run that is shown, at its time (s), and whether that has ended.
-  add(t, { handle, F_hand }, ended, dimension) {
+  add(t, { handle, pulled }, ended, dimension) {
     if (!this.offered) return;
+    if (!(t >= this.swings.t)) [this.changed, this.pulled] = [-Infinity, false]; // a run begins, with what was set before
+    if (pulled && !this.pulled) this.pressed = t;
+    this.pulled = pulled;
     this.swings.add(t, handle, dimension);
-    const { vibration, watched, trace } = this.swings, [words, light] = felt(vibration, F_hand, watched, ended);
+    const { vibration, trace } = this.swings, settled = t - this.changed >= 1, watched = this.swings.watched && settled && t - this.pressed >= 1;
+    const does = DIVERGED.test(ended) ? "diverged" : vibration && "vibrated";
+    if (does && pulled && settled && this.others && this.did.get(this.others) !== "") this.did.set(this.others, this.soft ? "" : does);
+    const [words, light] = felt(vibration, pulled, watched, ended, this.soft && this.did.get(this.others));
     if (words !== this.felt.textContent) this.felt.textContent = words;
     this.light.className = `light ${light}`;
     this.trace = vibration ? trace : [];

@@ -29,12 +29,12 @@ export class Legend {
   // The chip is the mark as it is drawn.
   entry(mark) {
     const item = document.createElement("li"), value = document.createElement("b"), shape = this.shapes[mark.kind];
-    item.innerHTML = shape ? '<svg viewBox="-9 -7 18 14"><polygon/></svg>' : '<svg viewBox="0 -4 18 14"><path d="M1 3H17"/></svg>';
+    item.innerHTML = shape ? '<svg viewBox="-9 -7 18 14"><polygon/></svg>' : `<svg viewBox="0 -4 18 14"><path d="${mark.kind === "spring" ? "M1 3H3L5 0 8 6 11 0 13 3H17" : "M1 3H17"}"/></svg>`;
     const drawn = item.firstChild.firstChild;
     if (shape) drawn.setAttribute("points", shape.map(([x, y]) => `${x},${-y}`).join(" "));
     drawn.setAttribute("stroke", inTheme(mark.stroke ?? "none"));
     drawn.setAttribute("fill", inTheme((shape && mark.fill) || "none"));
-    drawn.setAttribute("stroke-width", shape ? mark.width : 2.5);
+    drawn.setAttribute("stroke-width", shape ? mark.width : mark.kind === "spring" ? 1.4 : 2.5);
     if (mark.dash.length) drawn.setAttribute("stroke-dasharray", "4 2");
     item.append(` ${mark.label} `, value);
     return value;

@@ -70,12 +70,15 @@ const HANDLERS = {
     $("acts").hidden = !message.b;
     $("compare").ariaPressed = Boolean(message.b);
     controls.show(acting());
-    first_minute.show(acting());
+    first_minute.show(acting(), !message.b);
     if (begins) follow();
     else note_address();
   },
   state(message) {
-    if (message.ended && !view.state.ended) ending.show(message.ended, shown?.b && (message.b ? "B" : "A"));
+    if (message.ended && !view.state.ended) {
+      ending.show(message.ended, shown?.b && (message.b ? "B" : "A"));
+      stage.include(ending.frames);
+    }
     view.state = message;
     $("pause").textContent = message.paused ? "Go on" : "Pause";
     $("record").classList.toggle("on", Boolean(message.recording));
@@ -231,11 +234,10 @@ $("listen").onclick = () => {
   $("hear").value = $("hear").value ? "" : "force";
   $("hear").onchange();
 };
-// A press elsewhere than on the picture is over first: else what is pressed moves away from it, and is not clicked.
-document.addEventListener("pointerdown", ({ target }) => { if (target === stage.canvas) ending.hide(); }, true);
-document.addEventListener("click", () => ending.hide(), true);
+// Who opens More reads there why the run ended.
+document.addEventListener("pointerdown", ({ target }) => { if (!target.closest("summary")) ending.hide(); }, true);
 document.addEventListener("keydown", (event) => {
-  if (!event.repeat) ending.hide();
+  if (!event.repeat && event.target.localName !== "summary") ending.hide();
   if (event.target.closest("input, select, button, summary")) return;
   if (event.key in PULLS) {
     event.preventDefault();
@@ -265,17 +267,17 @@ function second() {
 
 function draw() {
   if (view.frame) {
-    const { b } = view.frame;
+    const slow = ending.frame, frame = slow ?? view.frame, { b } = frame;
     stage.trace = first_minute.trace;
-    stage.draw(ending.frame ?? view.frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
-    tags($("tags"), [...view.frame.states.filter((state) => !state.startsWith("energy")).map(label), ...(b ? [[SECOND, second()]] : [])]);
-    $("time").textContent = `${view.frame.t.toFixed(2)} s`;
+    stage.draw(frame, b ? [{ marks: view.marks, frame: b, color: SECOND }] : []);
+    tags($("tags"), [...frame.states.filter((state) => !state.startsWith("energy")).map(label), ...(b ? [[SECOND, second()]] : [])]);
+    $("time").textContent = `${frame.t.toFixed(2)} s`;
+    charts.draw(undefined, slow?.t);
   } else {
     if (view.start) stage.draw(view.start);
     if (view.building) note();
   }
   if (view.map) $("map").textContent = verdict(view.map);
-  charts.draw();
   requestAnimationFrame(draw);
 }
 // The run is in this file, as its program, or behind the server that the page is from.

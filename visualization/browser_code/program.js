@@ -128,7 +128,7 @@ export class Program {
   // A frame as the server sends it.
   get frame() {
     const { data } = this, values = this.numbers(this.c.signal_values(this.m), data.n_values);
-    const frame = { t: this.time, states: [], stored: values[data.stored] };
+    const frame = { t: this.time, states: [], stored: values[data.stored], pulled: Boolean(this.pulling.get("")) };
     const of = (user) => (user ? ((frame.others ??= {})[user] ??= {}) : frame);
     for (const { user, name, places } of data.signals) of(user)[name] = places.map((place) => values[place]);
     const drawn = this.numbers(this.c.drawn(this.m), data.n_drawn);

@@ -6,6 +6,8 @@ import { paint, place, zigzag } from "./painter.js";
 import { View } from "./view.js";
 
 const HAND = "#b85c00";
+// The mouse's spring, as the legend has it.
+const PULL = { kind: "spring", at: [[["handle"], []]], stroke: HAND, dash: [], vector: [], label: "pull of the mouse" };
 const SEND_INTERVAL = 8; // ms, the least between two targets that are sent; frames are slower
 const KEYS = "keys", STEP = 0.004; // who pulls where keys do, and how far each time (m)
 const FITTED = ["obstacle", "body", "handle"]; // roles of marks that the picture contains
@@ -40,6 +42,12 @@ export class Stage {
       canvas.classList.toggle("held", this.pulls.size > 0);
       pull(null, pulling.user);
     };
+    // What is still pressed pulls on a run that begins anew, whose picture may have another size.
+    this.pullAgain = (pulling) => {
+      if (pulling.event) pulling.target = this.target(pointAt(pulling.event), pulling.depth);
+      sendTarget(pulling);
+    };
+    this.pulled = Boolean(pull);
     this.sendTarget = sendTarget;
     this.release = release;
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
@@ -55,7 +63,7 @@ export class Stage {
       canvas.setPointerCapture(event.pointerId);
       if (user === undefined) { this.turning = event.pointerId; return; }
       const { handle } = users(this.frame).find(([name]) => name === user)[1], depth = this.view.project(handle)[2];
-      const pulling = { user, depth, target: this.target(at, depth) };
+      const pulling = { user, depth, event, target: this.target(at, depth) };
       this.pulls.set(event.pointerId, pulling);
       canvas.classList.add("held");
       sendTarget(pulling);
@@ -69,7 +77,7 @@ export class Stage {
       if (event.pointerId === this.turning) this.turn(-TURN * event.movementX, TURN * event.movementY);
       const pulling = this.pulls.get(event.pointerId);
       if (!pulling) return;
-      pulling.target = this.target(pointAt(event), pulling.depth);
+      Object.assign(pulling, { event, target: this.target(pointAt(event), pulling.depth) });
       if (pulling.later) return; // the timer sends the newest target, also where the mouse has stopped
       const wait = pulling.sent + SEND_INTERVAL - performance.now();
       if (wait > 0) pulling.later = setTimeout(sendTarget, wait, pulling);
@@ -83,7 +91,6 @@ export class Stage {
     for (const end of ["pointerup", "pointercancel", "lostpointercapture"]) canvas.addEventListener(end, release);
   }
 
-  // A run that begins anew is pulled on by what is still pressed.
   begin(marks, shapes, view) {
     this.marks = marks;
     this.shapes = shapes;
@@ -91,7 +98,6 @@ export class Stage {
     this.given = JSON.stringify(view);
     this.refit();
     this.frame = null;
-    this.pulls.forEach(this.sendTarget);
   }
 
   refit() {
@@ -103,6 +109,17 @@ export class Stage {
   follow(frame) {
     const now = this.frameLimits(frame, 0.05);
     this.limits = this.limits.map(([low, high], i) => [Math.min(low, now[i][0]), Math.max(high, now[i][1])]);
+  }
+
+  // Widens a picture so that it has the handles of frames, with a margin, as far as it becomes three times as large.
+  include(frames) {
+    if (!this.limits) return;
+    const size = Math.max(...this.limits.map(([low, high]) => high - low)), margin = 0.15 * size;
+    const at = frames.flatMap((frame) => users(frame)).flatMap(([, { handle }]) => (handle ? [this.view.project(handle)] : []));
+    this.limits = this.limits.map(([low, high], i) => [
+      Math.max(low - size, Math.min(low, ...at.map((place) => place[i] - margin))),
+      Math.min(high + size, Math.max(high, ...at.map((place) => place[i] + margin))),
+    ]);
   }
 
   // Scales what is shown about a place, by default the middle.
@@ -180,11 +197,13 @@ export class Stage {
   // `others` are runs in the same picture: marks, frame and color of each.
   draw(frame, others = []) {
     const { context, width, height } = fitted(this.canvas);
-    if (!this.frame) this.legend.begin(this.marks, frame, this.shapes);
+    const begins = !this.frame;
+    if (begins) this.legend.begin(this.pulled ? [...this.marks, PULL] : this.marks, frame, this.shapes);
     this.frame = frame;
     this.limits ??= this.bounds?.() ?? this.frameLimits(frame);
     if (this.view.inSpace && this.follows && !this.pulls.size) this.follow(frame);
     this.fit(width, height);
+    if (begins) this.pulls.forEach((pulling) => this.pullAgain(pulling));
     paint(context, this.marks, frame, this);
     for (const other of others) paint(context, outlined(other), other.frame, this);
     if (this.trace?.length) this.drawTrace(context);

@@ -105,13 +105,26 @@ const HANDLERS = {
   sound({ port, signal }) { heard = port ? { port, signal, samples: [] } : null; },
 };
 
+// What is set behind an end is for the next run, and refused where none could begin with it; who pulls does so when it is there.
+function applyToNext(run, message) {
+  if (!run || message.type === "hand") return;
+  const next = new Program(module, data, { ...run.changed });
+  next.apply(message);
+  run.changed = changed[runs.indexOf(run)] = next.changed;
+}
+
 onmessage = ({ data: message }) => {
   const handler = HANDLERS[message.type];
   if (handler) { handler(message); return; }
   const is_hand = message.type === "hand", is_speed = message.key === SPEED;
   const on = is_hand || is_speed ? runs : [runs[message.b ? 1 : 0]], time = now();
-  try { for (const run of on) run?.apply(message); } catch (error) {
-    if (!state.ended) postMessage({ type: "refused", why: error.message }); // the next run has what is set behind an end
+  try {
+    for (const run of on) {
+      if (state.ended) applyToNext(run, message);
+      else run?.apply(message);
+    }
+  } catch (error) {
+    postMessage({ type: "refused", why: error.message });
   }
   if (is_speed) setNow(time);
   if (!is_hand && runs.length) tell();

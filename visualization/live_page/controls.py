@@ -92,6 +92,11 @@ class Controls:
         """Whether it sets a hold that the connection can have in a run that begins with it."""
         return message.value in self._offered.holds.get(message.key.removeprefix("holds."), ())
 
+    @property
+    def pulled(self) -> bool:
+        """Whether a hand pulls the first user's handle, as the one that holds a board does."""
+        return self._pulling[""] or bool(driver_of(self._live.scene, ""))
+
     def parameters(self) -> dict[str, list[float]]:
         """The gains as they are set, with all hands pulling."""
         return {name: self._value(name).tolist() for name in self._gains}

@@ -25,11 +25,11 @@ class FrameReader:
         self._others = {user: outputs(fmus, user) for user in live.scene.devices}
         self._turns, self._sent = 0, 0.0
 
-    def send(self, live: LiveRun, link: Pipe) -> None:
-        """Send a frame, where the last one is FRAME ago."""
+    def send(self, live: LiveRun, link: Pipe, pulled: bool) -> None:
+        """Send a frame, where the last one is FRAME ago. pulled: whether the first user pulls."""
         if (now := time.monotonic()) - self._sent > FRAME:
             self._sent = now
-            link.send({"type": "frame"} | self.frame(live), frame=True)
+            link.send({"type": "frame", "pulled": pulled} | self.frame(live), frame=True)
 
     def handles(self, live: LiveRun) -> dict[str, list[float]]:
         """The poses (3,) of the handles by user, "" for the first one."""

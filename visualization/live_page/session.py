@@ -135,7 +135,7 @@ class LiveSession:
         if changed:
             self._tell_controls()
         self._require_server()
-        self._frames.send(live, self._link)
+        self._frames.send(live, self._link, self._controls.pulled)
 
     def _refuse(self, message: messages.Message, fault: InputFault) -> None:
         """Say why; a hold that only a run that begins with it can have begins anew with it."""

@@ -77,7 +77,7 @@ class TrialPage:
         for message in messages.newest(self._received()):
             if isinstance(message, messages.Hand):
                 self._controls.apply(message)
-        self._frames.send(live, self._link)
+        self._frames.send(live, self._link, self._controls.pulled)
 
     def _received(self) -> list[Any]:
         if not self._link.alive:

@@ -376,7 +376,8 @@ def _directions(user: str) -> Mark:
 def _handle(user: str) -> Iterator[Mark]:
     """With its way to the point that it should be at."""
     at = (Place((*_of(user), "handle")),)
-    yield Mark("handle", "line", (*at, Place((*_of(user), "x"))), RED, width=1.0, dash=(1.0, 1.6))
+    yield Mark("handle", "line", (*at, Place((*_of(user), "x"))), RED, width=1.0, dash=(1.0, 1.6),
+               label="" if user else "tracking error")  # fmt: skip
     if not user:
         yield Mark("handle", "ring", at, None, f"{KINDS['energy'][0]}99", when="energy")
     yield Mark("handle", "ring", at, RED, width=1.5, label="" if user else "handle")

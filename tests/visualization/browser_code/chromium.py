@@ -173,6 +173,73 @@ def has_its_first_minute(page: Page) -> None:
     page.until(f"{pressed}'false'")
 
 
+PLACES = """["#slow", "#remedy", "#why", "#more", "#scene"].map((name) => {
+  const { x, y, width } = document.querySelector(name).getBoundingClientRect();
+  return [name, x, y, width];
+})"""
+"""Of what is pressed in the first minute."""
+SLOWLY = """() => {
+  const of = (query) => document.querySelector(query), { frame, canvas } = view.stage;
+  if (!view.state.ended || !of("#note").textContent.startsWith("slow")) return false;
+  const over = of("#over").getBoundingClientRect(), scene = canvas.getBoundingClientRect();
+  const [x, y] = view.stage.toScreen(frame.handle), [right, down] = [scene.x + x, scene.y + y];
+  const items = [...document.querySelectorAll("#legend li")];
+  const legend = items.find((item) => item.textContent.includes("force, hand"));
+  view.slowly = [...(view.slowly ?? []), {
+    inside: x >= 0 && y >= 0 && x <= scene.width && y <= scene.height,
+    covered: down > over.y && down < over.bottom && right < over.right,
+    forces: [legend, of("[data-chart=force]")].map((each) => each.querySelector("b").textContent),
+  }];
+  return view.slowly.length >= 30;
+}"""
+"""Collects in slow motion what the picture and the plots show."""
+
+
+def goes_on_when_mended(page: Page) -> None:
+    """At 10 Hz a drag ends; what is said of that moves nothing, is of the run before once the next
+    one runs, and the remedy that is pressed meanwhile is named as what ended it."""
+    page.until("!document.getElementById('first').hidden")
+    said, ended = (f"document.getElementById('{name}').innerText" for name in ("said", "ended"))
+    page.page.fill("#slow", "0")
+    page.until("document.getElementById('hertz').textContent === '10 Hz'")
+    page.until(f"{said}.startsWith('No hand pulls')")
+    places = page.get(PLACES)
+    page.pull(0.02, -0.015)
+    page.until(f"{ended}.startsWith('Diverged at ')")
+    assert page.get(PLACES) == places
+    assert "the motion grew beyond all bounds" in page.get(ended)
+    assert "take a" not in page.get(ended)  # one advice
+    page.page.wait_for_function(SLOWLY, timeout=60_000)
+    seen = page.get("view.slowly")
+    assert all(each["inside"] and not each["covered"] for each in seen)
+    assert all(caption == f"hand {legend}" for legend, caption in (e["forces"] for e in seen))
+    page.until(f"{ended}.startsWith('The run before diverged at ')")
+    assert page.get(PLACES) == places
+    page.page.mouse.up()
+    assert page.get(ended).endswith("(see More).")
+    page.page.click("#more summary")
+    assert page.get(ended).startswith("The run before diverged at ")
+    assert not page.get(ended).endswith("(see More).")  # but with its message
+    page.get("document.getElementById('more').open = false")
+    page.get("document.querySelector('main').scrollTo(0, 0)")
+    page.pull(0.02, -0.015)
+    page.until(f"{ended}.startsWith('Diverged at ')")
+    page.page.mouse.up()
+    page.page.click("#remedy")
+    page.until("!view.state.ended && view.frame?.t > 0.1")
+    assert page.get("document.getElementById('remedy').ariaPressed === 'true'")
+    assert page.get(ended) == ""
+    assert page.get(PLACES) == places
+    page.pull(0.006, 0.012)
+    page.until(f"{said}.includes('it diverged before, and the softer coupling ended that')")
+    page.page.mouse.up()
+    page.until(f"{said}.startsWith('No hand pulls')")
+    assert page.get("document.getElementById('felt').className.trim()") == "light"
+    assert page.get(PLACES) == places
+    page.page.click("#restore")
+    page.until("document.getElementById('remedy').ariaPressed === 'false'")
+
+
 def shaken(seen: list[list[float]]) -> float:
     """The RMS (mm) of a motion above 3 Hz in the last second of times (s) and places (m)."""
     t, *place = np.array(seen).T

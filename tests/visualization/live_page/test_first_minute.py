@@ -15,7 +15,13 @@ from scipy.signal import butter, sosfiltfilt
 import hapticlink as hl
 from hapticlink.visualization.live_and_standalone.offered_controls import RATE
 from hapticlink.visualization.live_and_standalone.viewed_scene import load_viewed_scene
-from tests.visualization.browser_code.chromium import COLLECT, Page, has_its_first_minute, shaken
+from tests.visualization.browser_code.chromium import (
+    COLLECT,
+    Page,
+    goes_on_when_mended,
+    has_its_first_minute,
+    shaken,
+)
 from tests.visualization.browser_code.javascript import javascript
 from tests.visualization.browser_code.served_page import Served
 from tests.visualization.live_page.viewed_controls import begun, judged, set_by
@@ -137,20 +143,70 @@ def test_the_trace_is_where_it_was_in_the_last_second() -> None:
 def test_it_is_steady_only_in_a_hand() -> None:
     """That was watched for a second, of a run that goes on; and what vibrates by itself does so."""
     told = "answer = given.map((each) => felt(...each));"
-    swings, nobody, hand = {"times": 5, "mm": 6}, [0, 0, 0], [0, -0.1, 0]
+    swings, off, on = {"times": 5, "mm": 6}, False, True
     said = {
-        "No hand pulls": [None, nobody, True, None],
-        "A second is watched first.": [None, hand, False, None],
-        "The handle is steady": [None, hand, True, None],
-        "The handle vibrates (red trace)": [swings, nobody, False, None],
-        "The run has ended": [None, hand, True, "the device left its workspace"],
-        "The motion grew beyond all bounds": [swings, hand, True, "the run has diverged"],
+        "No hand pulls": [None, off, True, None],
+        "A second is watched first.": [None, on, False, None],
+        "The handle is steady": [None, on, True, None],
+        "The handle vibrates (red trace)": [swings, on, False, None],
+        "No hand pulls (its damper stays)": [swings, off, True, None],
+        "The run has ended": [None, on, True, "the device left its workspace"],
+        "The motion grew beyond all bounds": [swings, on, True, "the run has diverged"],
     }
-    on_a_board = javascript("first_minute.js", told, [[None, None, True, None]])
-    assert on_a_board[0][0].startswith("The handle is steady")
     found = javascript("first_minute.js", told, [*said.values()])
     assert [words.split(":")[0] for words, _ in found] == [*said]
-    assert [light for _, light in found] == ["", "", "green", "red", "red", "red"]
+    assert [light for _, light in found] == ["", "", "green", "red", "red", "red", "red"]
+
+
+ENDED = """
+  const element = { replaceChildren() {}, matches: () => false, querySelector: () => ({}) };
+  const host = { querySelector: () => ({ ...element }) };
+  globalThis.document = { createElement: () => ({}) };
+  const page = new FirstMinute(host, () => {});
+  page.begin(given.controls);
+  const having = (softer, rate, alone = true) => page.show(given.controls.map((each) => {
+    const soft = page.offered.softer.find(({ key }) => key === each.key);
+    if (soft) return { ...each, value: softer ? soft.value : 1 };
+    return each.key === page.offered.rate.key ? { ...each, value: rate } : each;
+  }), alone);
+  let t = 0;
+  const drag = (seconds, shakes, ended = null, pulled = true) => {
+    for (const end = t + seconds; t < end; t += 0.016) {
+      page.add(t, { handle: [0, shakes * Math.sin(40 * t)], pulled }, null, 2);
+    }
+    page.add(t, { handle: [0, 0], pulled }, ended, 2);
+    return page.felt.textContent;
+  };
+  const BEYOND = "the run has diverged";
+"""
+NAMES_IT = "the softer coupling ended that"
+
+
+@pytest.mark.parametrize(
+    ("course", "did"),
+    [
+        ("having(0, 11); drag(2, 3e-3); having(1, 11); drag(3, 0)", "vibrated"),
+        ("having(0, 11); drag(2, 0, BEYOND); t = 0; having(1, 11); drag(3, 0)", "diverged"),
+        ("having(0, 11); drag(2, 3e-3); having(1, 11); drag(0.9, 0)", ""),  # not watched yet
+        ("having(0, 11); drag(2, 3e-3); having(1, 11); drag(3, 0, null, false)", ""),  # no hand
+        ("having(0, 11); drag(2, 3e-3); having(1, 30); drag(3, 0)", ""),  # or the rate
+        ("having(0, 11); drag(2, 0); having(1, 11); drag(3, 0)", ""),  # nothing was to end
+        ("having(0, 11); drag(2, 3e-3, null, false); having(1, 11); drag(3, 0)", ""),  # in no hand
+        ("having(0, 11); drag(2, 3e-3); having(1, 11); drag(3, 3e-3); drag(3, 0)", ""),  # nor ended
+        ("having(0, 11); drag(2, 3e-3); having(0, 11); drag(3, 0)", ""),  # without the remedy
+        ("drag(1, 3e-3); having(0, 30); drag(0.4, 3e-3); having(1, 30); drag(3, 0)", ""),
+        ("having(0, 11, false); drag(2, 3e-3); having(1, 11, false); drag(3, 0)", ""),  # A or B
+    ],
+)
+def test_the_softer_coupling_ended_it_only_where_the_same_shook_without(
+    of_scene: Begun, course: str, did: str
+) -> None:
+    """In a hand, at the same rate and all else the same, for a second each, and not with it."""
+    *before, last = course.split("; ")
+    statements = f"{ENDED}{';'.join(before)}; answer = {last};"
+    said = javascript("first_minute.js", statements, {"controls": of_scene[0]})
+    assert (NAMES_IT in said) is bool(did)
+    assert did in said
 
 
 @pytest.mark.parametrize("stiffness", [1e3, 1e12])
@@ -183,16 +239,11 @@ def test_slowed_down_it_vibrates_until_the_remedy_is_pressed(
     has_its_first_minute(page)
 
 
-def test_the_remedy_is_pressed_although_the_line_on_a_run_that_ended_goes(
-    served: Served, window: Callable[..., Page]
+@pytest.mark.parametrize("size", [(1280, 800), (400, 800)])
+def test_a_run_that_diverges_moves_no_control_and_is_mended(
+    served: Served, window: Callable[..., Page], size: tuple[int, int]
 ) -> None:
-    """It stands above the picture, so that all below it moves up."""
-    page = window(served.url)
-    page.until("!document.getElementById('first').hidden")
-    page.get("document.getElementById('ended').textContent = 'Diverged at 1 s, and why'")
-    page.page.click("#remedy")
-    page.until("document.getElementById('remedy').ariaPressed === 'true'")
-    assert page.page.inner_text("#ended") == ""
+    goes_on_when_mended(window(served.url, *size))
 
 
 def test_more_is_folded_until_it_is_asked_for_by_a_click_or_a_link(
@@ -272,3 +323,20 @@ def test_why_has_the_rate_of_the_force_not_the_highest_of_the_linkage() -> None:
     rate = {"value": 40, "max": 50, "haptics": 512}
     said = javascript("first_minute.js", "answer = why(given, true);", rate)
     assert "computed 40 times a second, the force on the hand 512 times" in said
+
+
+def test_a_handle_that_leaves_the_picture_is_taken_in() -> None:
+    """With a margin of .15 of its size, and not by more than that on either side."""
+    found = javascript(
+        "stage.js",
+        """const stage = { limits: [[0, 1], [0, 0.5]], view: { project: (at) => at } };
+        const widened = (...at) => {
+          Stage.prototype.include.call(stage, at.map((handle) => ({ handle })));
+          return stage.limits;
+        };
+        answer = [widened([0.5, 0.25]), widened([0.5, 0.7], null), widened([-9, 0.25])];""",
+        None,
+    )
+    assert found[0] == [[0, 1], [0, 0.5]]
+    assert np.ravel(found[1]) == pytest.approx([0, 1, 0, 0.85])
+    assert np.ravel(found[2]) == pytest.approx([-1, 1, 0, 0.85])

@@ -20,6 +20,7 @@ from tests.visualization.browser_code.chromium import (
     Page,
     assert_slow_motion,
     differ_without_topology,
+    goes_on_when_mended,
     has_its_first_minute,
 )
 from tests.visualization.browser_code.javascript import NODE, javascript
@@ -234,6 +235,7 @@ def test_the_first_minute_of_a_mechanism_at_the_graphics_rate(
     assert status("view", "--standalone", file) == 0  # the scene that needs no name
     page = window(f"file://{file}")
     has_its_first_minute(page)
+    goes_on_when_mended(page)
     page.page.click("#listen")
     page.until("view.sound.context?.state === 'running'")
     assert page.get("document.getElementById('hear').value") == "force"
