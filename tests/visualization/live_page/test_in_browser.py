@@ -46,7 +46,7 @@ def test_a_drag_moves_the_linkage_along_its_free_direction_alone(
 def test_the_page_says_what_to_do_until_somebody_does_it(served: Served, window: Window) -> None:
     page = window(served.url)
     assert page.page.inner_text("#door").startswith(
-        "Press and drag anywhere. Along the dotted line it resists."
+        "Press and drag anywhere. Along the pink line it resists."
     )
     page.pull(0.0, 0.0)
     page.until("document.getElementById('door').hidden")
