@@ -34,7 +34,7 @@ CODE_LINES = {
     "fmus": 2995,
     "orchestrator": 16914,
     "programs": 1047,
-    "analysis": 9215,
+    "analysis": 9216,
     "visualization": 3852,
     "api": 637,
     "commands": 1640,

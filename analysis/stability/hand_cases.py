@@ -178,14 +178,15 @@ class InHands:
         largest, unsure = -np.inf, 0.0
         for hand in hands.values():
             mode, period, _ = self._leading(hand)
-            growth, least = mode.growth, max(SLIGHT, TWICE * slow(hand))
-            unstable = self._verdict(mode) == "unstable"
-            if not unstable and growth <= least:
+            growth, unstable = mode.growth, self._verdict(mode) == "unstable"
+            if not unstable and (growth <= SLIGHT or growth <= TWICE * slow(hand)):
                 largest = max(largest, min(growth, -SLIGHT))
             elif kind(growth, period.traced(mode).omega / (2 * np.pi), bounds) != "drift":
+                if mode.uncertainty < UNSURE * self._seconds:
+                    return growth
+                least = max(SLIGHT, TWICE * slow(hand))
                 apart = np.expm1(least * self._seconds) + SURELY * mode.uncertainty
-                sure = mode.uncertainty < UNSURE * self._seconds
-                if sure or verdict(abs(mode.z), apart) == "unstable":
+                if verdict(abs(mode.z), apart) == "unstable":
                     return growth
                 unsure = max(unsure, growth)
         if unsure:
