@@ -10,7 +10,8 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -82,6 +83,21 @@ def of_file(browser: Any, name: str) -> None:
     page.close()
 
 
+@contextmanager
+def served(scene: str, folder: str) -> Iterator[str]:
+    """The address at which the page of a scene is served, which ends with the context."""
+    command = [sys.executable, "-m", "hapticlink", "view", scene, "--no-browser", "--port", "0"]
+    serving = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, text=True)
+    try:
+        assert serving.stdout
+        found = re.search(r"http://\S+", serving.stdout.readline())
+        assert found
+        yield found[0]
+    finally:
+        serving.send_signal(signal.SIGTERM)
+        serving.wait()
+
+
 def main(names: Collection[str]) -> None:
     OUT.mkdir(exist_ok=True)
     with sync_playwright() as started, tempfile.TemporaryDirectory() as folder:
@@ -95,28 +111,19 @@ def main(names: Collection[str]) -> None:
                 of_file(browser, name)
                 continue
             scene, (width, height), path = SHOTS[name]
-            command = [sys.executable, "-m", "hapticlink", "view", scene]
-            served = subprocess.Popen(
-                [*command, "--no-browser", "--port", "0"],
-                cwd=folder, stdout=subprocess.PIPE, text=True,
-            )  # fmt: skip
-            assert served.stdout
-            found = re.search(r"http://\S+", served.stdout.readline())
-            assert found
             window = {"viewport": {"width": width, "height": height}, "bypass_csp": True}
-            page = browser.new_page(**window)
-            page.goto(found[0])
-            if name in OTHERS:
-                user, other = OTHERS[name]
-                second = browser.new_page(**window)
-                second.goto(found[0])
-                dragged(second, other, user)
-            dragged(page, path)
-            page.screenshot(path=OUT / f"{name}.png")
-            for each in [*browser.contexts]:
-                each.close()
-            served.send_signal(signal.SIGTERM)
-            served.wait()
+            with served(scene, folder) as address:
+                page = browser.new_page(**window)
+                page.goto(address)
+                if name in OTHERS:
+                    user, other = OTHERS[name]
+                    second = browser.new_page(**window)
+                    second.goto(address)
+                    dragged(second, other, user)
+                dragged(page, path)
+                page.screenshot(path=OUT / f"{name}.png")
+                for each in [*browser.contexts]:
+                    each.close()
 
 
 if __name__ == "__main__":
