@@ -19,8 +19,8 @@ export function firstMinute(controls) {
   return { rate, rates, softer: scaled(controls, SOFTER), about };
 }
 
-// What is said of the handle, and in which light: of its vibration, whether a hand pulls it, whether it was watched for long
-// enough, whether the run has ended, and what it did without the remedy that is on.
+// What is said of the handle, and in which light: of its vibration, whether a hand pulls it (a board's always does), whether it
+// was watched for long enough, whether the run has ended, and what it did without the remedy that is on.
 export function felt(vibration, pulled, watched, ended, did) {
   if (DIVERGED.test(ended)) return ["The motion grew beyond all bounds: see the slow motion. Then it begins anew.", "red"];
   if (ended) return ["The run has ended: the line on the picture says why.", "red"];
